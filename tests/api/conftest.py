@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from fastapi.testclient import TestClient
 from api.app import create_app
 from certifier.jobs.region import Region, certified_region
 from certifier.jobs.share import SampledProposal
-from certifier.model import Scene
+from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Outcome, Stage
 from certifier.pair.certification import Certification
 from certifier.pair.result import PairResult
@@ -169,15 +170,26 @@ def planar(database: Database) -> Scene:
     return scene
 
 
-@pytest.fixture
-def planar_region(database: Database, planar: Scene) -> str:
-    """The id of a region of that arm, with a corner cut off."""
+@cache
+def cut_corner() -> Region:
+    """A certified region of that arm, with a corner cut off."""
+    planar = planar_arm(limit=1.2)
     box = cube(planar, [-0.2, -0.1], 0.1)
     polytope = planar.polytope([*box.C[:4], [1.0, 1.0]], [*box.d[:4], -0.2])
-    center = np.array([-0.22, -0.12])
-    results = [Certification(planar, polytope, center).certify(index) for index in range(len(planar.pairs))]
-    proofs = {index: result.proof or b"" for index, result in enumerate(results)}
-    return store_region(database, certified_region(planar, accepted(polytope, center), proofs, {"seconds": 1.0}, None))
+    return certified_polytope(planar, polytope, np.array([-0.22, -0.12]))
+
+
+def certified_polytope(scene: Scene, polytope: Polytope, center: Array) -> Region:
+    """The region of a polytope whose pairs all have a proof."""
+    certification = Certification(scene, polytope, center)
+    proofs = {index: certification.certify(index).proof or b"" for index in range(len(scene.pairs))}
+    return certified_region(scene, accepted(polytope, center), proofs, {"seconds": 1.0}, None)
+
+
+@pytest.fixture
+def planar_region(database: Database, planar: Scene) -> str:
+    """The id of a stored region of that arm, with a corner cut off."""
+    return store_region(database, cut_corner())
 
 
 def store_region(database: Database, certified: Region) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -12,28 +13,27 @@ import pytest
 from fastapi.testclient import TestClient
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from certifier.jobs.region import certified_region
+from certifier.jobs.region import Region
 from certifier.model import Scene
-from certifier.pair.certification import Certification
 from db import scenes
 from db.session import Database
 from planner.poses.frame import frame_of, pose_at, pose_of
-from tests.api.conftest import store_region
-from tests.certifier.scenes import accepted, cube, planar_arm
+from tests.api.conftest import certified_polytope, store_region
+from tests.certifier.scenes import cube, planar_arm
 
 BOXES = [((-0.2, -0.1), 0.1), ((-0.05, -0.1), 0.1), ((-0.5, -0.5), 0.05)]
 """Centres and half widths in s of three regions: the first two overlap, the third is apart."""
 
 
+@cache
+def certified_boxes() -> list[Region]:
+    scene = planar_arm(limit=1.2)
+    return [certified_polytope(scene, cube(scene, center, half), np.array(center)) for center, half in BOXES]
+
+
 @pytest.fixture
 def regions(database: Database, planar: Scene) -> list[str]:
-    found = []
-    for center, half in BOXES:
-        polytope = cube(planar, center, half)
-        results = [Certification(planar, polytope, np.array(center)).certify(index) for index in range(len(planar.pairs))]
-        proofs = {index: result.proof or b"" for index, result in enumerate(results)}
-        found.append(store_region(database, certified_region(planar, accepted(polytope, np.array(center)), proofs, {"seconds": 1.0}, None)))
-    return found
+    return [store_region(database, region) for region in certified_boxes()]
 
 
 @pytest.fixture

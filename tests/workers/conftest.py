@@ -19,14 +19,6 @@ from tests.workers.service import Service, running_service
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What is marked ``lengthy`` is repeated on PostgreSQL by the slow suite only."""
-    for item in items:
-        if item.get_closest_marker("lengthy") and "postgresql" in item.nodeid:
-            item.add_marker(pytest.mark.slow)
-
-
 @pytest.fixture(scope="session")
 def planar() -> Scene:
     """Two joints, six pairs of some 50 ms."""

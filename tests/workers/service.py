@@ -51,13 +51,13 @@ def environment(**variables: str) -> Iterator[None]:
                 cache.cache_clear()
 
 
-def eventually(look: Callable[[], Found | None], what: str, seconds: float = PATIENCE_SECONDS) -> Found:
-    """The first true answer."""
+def eventually(look: Callable[[], Found | None], what: str, seconds: float = PATIENCE_SECONDS, every: float = 0.01) -> Found:
+    """The first true answer. Looks again after ``every`` seconds, which is longer where a look makes others work."""
     until = time.monotonic() + seconds
     while not (found := look()):
         if time.monotonic() > until:
             raise AssertionError(f"{what}: not within {seconds} s")
-        time.sleep(0.01)
+        time.sleep(every)
     return found
 
 

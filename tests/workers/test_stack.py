@@ -30,6 +30,8 @@ from workers.processes import die_with_parent
 from workers.stack import Child, _data_directory, _reserved_port
 
 COMMAND = [sys.executable, "-m", "workers.stack"]
+ASK_AGAIN_SECONDS = 0.2
+"""Each question makes a process of the API work."""
 
 
 class Stack:
@@ -39,6 +41,7 @@ class Stack:
         self.data = data
         environment = {name: value for name, value in os.environ.items() if not name.startswith("CIRIS_")} | {
             "CIRIS_API_PROCESSES": "2",
+            "CIRIS_SOLVE_PROCESSES": "1",  # each loads Drake
             **own,
         }
         self.process = subprocess.Popen([*COMMAND, "--data", str(data)], cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True)
@@ -86,7 +89,7 @@ def test_what_dies_is_started_again_what_is_drained_is_not_and_a_stop_leaves_not
     os.kill(before["queue"], signal.SIGKILL)
     os.kill(before["api"], signal.SIGKILL)
     eventually(lambda: not set(stack.description["pids"].values()) & {before["queue"], before["api"]}, "both are started again")
-    eventually(stack.ready, "the API reaches the queue again")
+    eventually(stack.ready, "the API reaches the queue again", every=ASK_AGAIN_SECONDS)
 
     def ask(path: str, method: str = "GET") -> Any:
         with urllib.request.urlopen(urllib.request.Request(f"{stack.description['url']}{path}", method=method), timeout=20) as answer:
@@ -96,7 +99,8 @@ def test_what_dies_is_started_again_what_is_drained_is_not_and_a_stop_leaves_not
         return next((worker["id"] for worker in ask("/v1/workers")["workers"] if worker["kind"] == "solve"), None)
 
     after = stack.description["pids"]
-    ask(f"/v1/workers/{eventually(solver, 'the worker says that it lives')}/drain", "POST")
+    drained = eventually(solver, "the worker says that it lives", every=ASK_AGAIN_SECONDS)
+    ask(f"/v1/workers/{drained}/drain", "POST")
     eventually(lambda: gone({"solve": after["solve"]}), "it ends")
     time.sleep(3)
     assert stack.description["pids"] == after
@@ -121,7 +125,7 @@ def stack_on_ipv6(tmp_path: Path) -> Iterator[Stack]:
 def test_the_processes_of_the_api_share_a_port_of_ipv6_and_count_together(stack_on_ipv6: Stack) -> None:
     stack = stack_on_ipv6
     assert stack.description["url"].startswith("http://[::1]:")
-    eventually(stack.ready, "the service is ready")
+    eventually(stack.ready, "the service is ready", every=ASK_AGAIN_SECONDS)
 
     def ask(path: str) -> str:
         with urllib.request.urlopen(f"{stack.description['url']}{path}", timeout=10) as answer:

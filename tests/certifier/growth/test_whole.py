@@ -374,7 +374,7 @@ def three_stages():
     return scene, asked, region
 
 
-@pytest.mark.parametrize("processes", [1, 2, 3])
+@pytest.mark.parametrize("processes", [1, 2, pytest.param(3, marks=pytest.mark.slow)])
 def test_the_same_job_comes_to_the_same_bytes(processes):
     scene, asked, first = three_stages()
     second = grow(scene, asked, processes=processes)

@@ -6,6 +6,7 @@ No region of a cover has the same request as another one, and none is one that t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -89,17 +90,9 @@ def scenes(draw: st.DrawFn) -> list[Wall]:
     return [(-0.1, 0.1, -LIMIT, top), *posts]
 
 
-@pytest.mark.lengthy
-@given(
-    those=scenes(),
-    ends=st.tuples(st.floats(-1.9, -0.3), st.floats(-1.9, 1.9), st.floats(0.3, 1.9), st.floats(-1.9, 1.9)),
-    coverage=st.sampled_from([None, 0.6]),
-    connected=st.booleans(),
-    at_once=st.integers(1, 3),
-    number=st.integers(0, 1000),
-)
-@settings(max_examples=30, deadline=None)
-def test_no_cover_asks_twice_or_for_what_is_there(scene, those, ends, coverage, connected, at_once, number) -> None:
+def check_a_cover(
+    scene: Scene, those: list[Wall], ends: tuple[float, ...], coverage: float | None, connected: bool, at_once: int, number: int
+) -> None:
     rng = np.random.default_rng(number)
     connect = (ends[:2], ends[2:])
     if walls(scene, those)(scene.to_s(np.array(connect))).any():
@@ -109,6 +102,29 @@ def test_no_cover_asks_twice_or_for_what_is_there(scene, those, ends, coverage, 
     requests = [(task.q, task.contain, task.turn) for task, _ in made]
     assert len(set(requests)) == len(requests), end.reason
     assert not [task for task, again in made if again], end.reason
+
+
+COVERS = {
+    "those": scenes(),
+    "ends": st.tuples(st.floats(-1.9, -0.3), st.floats(-1.9, 1.9), st.floats(0.3, 1.9), st.floats(-1.9, 1.9)),
+    "coverage": st.sampled_from([None, 0.6]),
+    "connected": st.booleans(),
+    "at_once": st.integers(1, 3),
+    "number": st.integers(0, 1000),
+}
+
+
+@given(**COVERS)
+@settings(max_examples=10, deadline=None)
+def test_no_cover_asks_twice_or_for_what_is_there(scene: Scene, **cover: Any) -> None:
+    check_a_cover(scene, **cover)
+
+
+@pytest.mark.slow
+@given(**COVERS)
+@settings(max_examples=200, deadline=None)
+def test_of_many_covers_none_asks_twice_or_for_what_is_there(scene: Scene, **cover: Any) -> None:
+    check_a_cover(scene, **cover)
 
 
 def test_a_region_that_joins_nothing_is_not_grown_again(scene: Scene) -> None:
