@@ -33,11 +33,12 @@ def scene_init(args: Namespace) -> int:
     for path in (out, seed):
         if path.exists():
             raise CirisError("file_exists", f"{path} is there already", field="--out", hint="move it away, or name another file")
-    packages = dict(_package(text) for text in args.package)
+    packages = {name: Path(directory) for name, directory in (_named(text, "--package", "DIRECTORY") for text in args.package)}
+    arguments = dict(_named(text, "--xacro", "VALUE") for text in args.xacro)
     made = not out.parent.exists()
     out.parent.mkdir(parents=True, exist_ok=True)
     try:
-        drafted = draft(Path(args.robot), [Path(world) for world in args.world], out, packages)
+        drafted = draft(Path(args.robot), [Path(world) for world in args.world], out, packages, arguments)
     except CirisError:
         if made:
             out.parent.rmdir()
@@ -61,11 +62,11 @@ def scene_init(args: Namespace) -> int:
     return 0
 
 
-def _package(text: str) -> tuple[str, Path]:
-    name, _, directory = text.partition("=")
-    if not name or not directory:
-        raise CirisError("bad_option", f"must be NAME=DIRECTORY, not {text!r}", field="--package")
-    return name, Path(directory)
+def _named(text: str, option: str, what: str) -> tuple[str, str]:
+    name, _, value = text.partition("=")
+    if not name or not value:
+        raise CirisError("bad_option", f"must be NAME={what}, not {text!r}", field=option)
+    return name, value
 
 
 def scene_check(args: Namespace) -> int:

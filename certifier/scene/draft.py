@@ -25,6 +25,7 @@ from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Array, JointKind, Pair, Scene
 from certifier.scene.contacts import touching
 from certifier.scene.load import MEMORY_BYTES, TIMEOUT_S, load_scene, read_in_child
+from certifier.scene.macros import Expander, in_xacro, packages_named
 from certifier.scene.mimics import Mimic, at_rest
 from certifier.scene.paths import beside
 from certifier.scene.references import references
@@ -61,12 +62,13 @@ class Draft:
     overlapping: tuple[Pair, ...]
 
 
-def draft(robot: Path, worlds: Sequence[Path], out: Path, packages: Mapping[str, Path]) -> Draft:
+def draft(robot: Path, worlds: Sequence[Path], out: Path, packages: Mapping[str, Path], arguments: Mapping[str, str]) -> Draft:
     """Returns a scene file for a robot and what stands around it, which was loaded once.
 
     Args:
         robot, worlds: model files, URDF, SDFormat or MJCF.
         out: where the scene file will be; the paths in it are relative to its directory.
+        arguments: arguments of models that are written in xacro.
         packages: directories of packages, by name; others are looked for in the directories above the model that names them.
 
     Raises:
@@ -76,8 +78,8 @@ def draft(robot: Path, worlds: Sequence[Path], out: Path, packages: Mapping[str,
     for path in (robot, *worlds):
         models[_unused(_name_in(path), models)] = path
     directory = out.parent.resolve()
-    found = {name: root for path in models.values() for name, root in _packages(path, packages).items()}
-    head = _head(out, robot, found, directory)
+    found = {name: root for path in models.values() for name, root in _packages(path, packages, arguments, directory).items()}
+    head = _head(out, robot, found, arguments, directory)
     add = {name: f"  - add_model: {{name: {_quoted(name)}, file: {_quoted(_relative(path, directory))}}}" for name, path in models.items()}
     held = _inventory("\n".join([head, *add.values()]), models, directory)
     head = "\n".join([head, *_directives(add, held["roots"]), *_limits(held), *_fix(held)]) + "\n"
@@ -132,36 +134,51 @@ def _name_in(path: Path) -> str:
     if not path.is_file():
         problem = f"{path} is a directory" if path.is_dir() else f"there is no file {path}"
         raise SceneError("scene_model", problem, hint="name a model file: URDF, SDFormat or MJCF")
-    parse_xml(path, path.name, "scene_model", install)
-    return next(filter(None, found[:1]), path.stem)
+    parse_xml(path.read_bytes(), path.name, "scene_model", install)
+    return next((name for name in found[:1] if name and "$" not in name), path.name.partition(".")[0])
 
 
 def _unused(name: str, taken: Collection[str]) -> str:
     return name if name not in taken else next(f"{name}_{i}" for i in range(2, 1000) if f"{name}_{i}" not in taken)
 
 
-def _packages(path: Path, given: Mapping[str, Path]) -> dict[str, Path]:
-    """Returns where the packages are that a model names."""
+def _packages(path: Path, given: Mapping[str, Path], arguments: Mapping[str, str], directory: Path) -> dict[str, Path]:
+    """Returns where the packages are that a model names. One that is written in xacro has to be in a package or below the directory."""
+
+    def find(name: str) -> Path | None:
+        above = [place / name for place in path.absolute().parents] + [place for place in path.absolute().parents if place.name == name]
+        return next((place.absolute() for place in ([given[name]] if name in given else above) if place.is_dir()), None)
+
     found: dict[str, Path] = {}
-    for reference in references(path):
+    expanded = None
+    if in_xacro(path, path.name):
+        found = packages_named(path, find)
+        file = beside(Path.cwd(), str(path))
+        if not any(file.is_relative_to(root) for root in (directory, *found.values())):
+            own = next((place for place in file.parents if (place / "package.xml").is_file()), file.parent)
+            found[own.name] = own
+        expanded = Expander(directory, found, arguments).expanded(file, path.name)
+    for reference in references(path, expanded):
         if not reference.startswith(_PACKAGES):
             continue
         name = reference.partition("://")[2].partition("/")[0]
-        above = [place / name for place in path.absolute().parents] + [place for place in path.absolute().parents if place.name == name]
-        places = [given[name]] if name in given else [place for place in above if place.is_dir()]
-        if not places or not places[0].is_dir():
+        place = find(name)
+        if place is None:
             message = f"{path.name} names the package {name}, which is not above it"
             raise SceneError("scene_package", message, hint=f"say where it is: --package {name}=DIRECTORY")
-        found[name] = places[0].absolute()
+        found[name] = place
     return found
 
 
-def _head(out: Path, robot: Path, packages: Mapping[str, Path], directory: Path) -> str:
+def _head(out: Path, robot: Path, packages: Mapping[str, Path], arguments: Mapping[str, str], directory: Path) -> str:
     name = out.stem if out.stem != "scene" else directory.name
     lines = [f"# Drafted by ciris scene init for {robot.name}; docs/scenes.md explains every key.", f"name: {_quoted(name)}"]
     if packages:
         lines += ["# Where the packages are that models name as package:// or model://", "packages:"]
         lines += [f"  {_quoted(package)}: {_quoted(_relative(root, directory))}" for package, root in packages.items()]
+    if arguments:
+        lines += ["# What the model's xacro is given", "xacro:"]
+        lines += [f"  {_quoted(key)}: {_quoted(value)}" for key, value in arguments.items()]
     return "\n".join([*lines, "directives:"])
 
 

@@ -11,11 +11,12 @@ def add(verbs: Any) -> None:
     """Adds the commands."""
     scene = group(verbs.add_parser("scene", help="draft, check, add, stage, promote, list, show and delete scenes"))
     init = scene.add_parser("init", help="write a scene file and a seed for a robot's model", epilog="Nothing is overwritten.")
-    init.add_argument("robot", metavar="ROBOT", help="model file: URDF, SDFormat or MJCF")
+    init.add_argument("robot", metavar="ROBOT", help="model file: URDF, SDFormat, MJCF or xacro")
     init.add_argument("--world", metavar="FILE", action="append", default=[], help="model of an obstacle around it; may be repeated")
     init.add_argument(
         "--package", metavar="NAME=DIR", action="append", default=[], help="directory of a package that a model names; may be repeated"
     )
+    init.add_argument("--xacro", metavar="NAME=VALUE", action="append", default=[], help="argument of a model in xacro; may be repeated")
     init.add_argument(
         "--out",
         metavar="FILE",

@@ -24,7 +24,7 @@ from certifier.scene.draft import draft
 )
 def test_a_robot_is_drafted_with_a_free_seed(name: str, joints: int, pairs: int, tmp_path: Path) -> None:
     model = models.write(name, tmp_path)
-    drafted = draft(model.robot, [model.world], tmp_path / "scene.yaml", {})
+    drafted = draft(model.robot, [model.world], tmp_path / "scene.yaml", {}, {})
     assert (drafted.scene.n, len(drafted.scene.pairs), drafted.ignored, drafted.overlapping) == (joints, pairs, (), ())
     assert drafted.seed is not None
 

@@ -65,7 +65,7 @@ def test_what_cannot_be_merged_is_said(tmp_path: Path, hulls: str, code: str, wo
 
 def test_the_draft_of_a_decomposed_link_asks_for_its_hull(tmp_path: Path) -> None:
     write(tmp_path, more=PARTS.format(MANY))
-    made = draft(tmp_path / "arm.urdf", [tmp_path / "room.sdf"], tmp_path / "drafted.yaml", {})
+    made = draft(tmp_path / "arm.urdf", [tmp_path / "room.sdf"], tmp_path / "drafted.yaml", {}, {})
     assert "hulls:\n  - arm/claw  # 6 parts\n" in made.text
     assert made.scene.has_geometry("arm/claw/hull")
     assert np.isfinite(made.scene.geometry("arm/claw/hull").vertices).all()
