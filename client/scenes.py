@@ -38,12 +38,13 @@ def scene_init(args: Namespace) -> int:
     for path in (out, seed):
         if path.exists():
             raise CirisError("file_exists", f"{path} is there already", field="--out", hint="move it away, or name another file")
-    packages = dict(_package(text) for text in args.package)
+    packages = {name: Path(directory) for name, directory in (_named(text, "--package", "DIRECTORY") for text in args.package)}
+    arguments = dict(_named(text, "--xacro", "VALUE") for text in args.xacro)
     worlds, mounts = [_standing(text) for text in args.world], [_mounted(text) for text in args.mount]
     made = not out.parent.exists()
     out.parent.mkdir(parents=True, exist_ok=True)
     try:
-        drafted = draft(Path(args.robot), worlds, out, packages, mounts, args.srdf and Path(args.srdf), os.environ)
+        drafted = draft(Path(args.robot), worlds, out, packages, mounts, args.srdf and Path(args.srdf), os.environ, arguments)
     except CirisError:
         if made:
             out.parent.rmdir()
@@ -98,11 +99,11 @@ def _split(text: str, option: str) -> tuple[str, tuple[Triple, Triple]]:
     return before, ((x, y, z), (roll, pitch, yaw))
 
 
-def _package(text: str) -> tuple[str, Path]:
-    name, _, directory = text.partition("=")
-    if not name or not directory:
-        raise CirisError("bad_option", f"must be NAME=DIRECTORY, not {text!r}", field="--package")
-    return name, Path(directory)
+def _named(text: str, option: str, what: str) -> tuple[str, str]:
+    name, _, value = text.partition("=")
+    if not name or not value:
+        raise CirisError("bad_option", f"must be NAME={what}, not {text!r}", field=option)
+    return name, value
 
 
 def scene_check(args: Namespace) -> int:

@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING
 
 from certifier.errors import CirisError, SceneError
 from certifier.isolation.child import prepare
-from certifier.scene.file import existing, read_scene_file, with_relative_packages
+from certifier.scene.file import existing, for_bundle, read_scene_file
 from certifier.scene.load import read_in_child
+from certifier.scene.macros import Expander, in_xacro
 from certifier.scene.references import is_mjcf, mjcf_references, references, resolve
 
 if TYPE_CHECKING:  # The command packs bundles without numpy, which the model needs.
@@ -56,21 +57,27 @@ def pack_bundle(path: str | Path) -> bytes:
 
     Where the scene file gives a package's absolute path, the bundle has the relative one: the package lies elsewhere there.
 
+    The bundle has the expansion of a model that is written in xacro.
+
     A file that is referred to but does not exist is left out. Loading the bundle then gives Drake's message about it.
 
     Raises:
         SceneError: the scene file is wrong, or a reference cannot travel (``bundle_uri``).
     """
     scene_file = read_scene_file(existing(path))
-    files = {scene_file.path}
+    expander = Expander(scene_file.path.parent, scene_file.packages, scene_file.xacro)
+    files, expanded = {scene_file.path}, dict[Path, bytes]()
     waiting = [resolve(model, scene_file.path.parent, scene_file.packages) for model in scene_file.files]
     while waiting:
         file = waiting.pop()
         if file not in files and file.is_file():
             files.add(file)
-            waiting += [resolve(r, file.parent, scene_file.packages) for r in references(file)]
+            if in_xacro(file, file.name):
+                expanded[file] = expander.expanded(file, file.name)
+            waiting += [resolve(r, file.parent, scene_file.packages) for r in references(file, expanded.get(file))]
             if is_mjcf(file):
                 waiting += mjcf_references(file, scene_file.packages)
+    expander.check_arguments()
     root = Path(os.path.commonpath([f.parent for f in files] + list(scene_file.packages.values())))
     data = io.BytesIO()
     with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -78,7 +85,7 @@ def pack_bundle(path: str | Path) -> bytes:
         for directory in sorted(set(scene_file.packages.values()) - {root}):
             _write(archive, f"{directory.relative_to(root).as_posix()}/", b"")
         for file in sorted(files):
-            content = with_relative_packages(file).encode() if file == scene_file.path else file.read_bytes()
+            content = for_bundle(file).encode() if file == scene_file.path else expanded.get(file) or file.read_bytes()
             _write(archive, file.relative_to(root).as_posix(), content)
     return data.getvalue()
 

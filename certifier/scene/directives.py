@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
@@ -118,7 +118,7 @@ def resolved(text: str, directives: yaml.Node, directory: Path) -> str:
     return "\n" * (line - 1) + "directives:\n" + " " * column + document
 
 
-def replaced(text: str, start: int, end: int, changed: list[tuple[yaml.ScalarNode, str]]) -> str:
+def replaced(text: str, start: int, end: int, changed: Sequence[tuple[yaml.Node, str]]) -> str:
     """Returns a part of the text with other texts in the place of some of its nodes, which are in order."""
     pieces, last = [], start
     for node, instead in changed:

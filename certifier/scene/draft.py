@@ -90,6 +90,7 @@ def draft(
     mounts: Sequence[Part] = (),
     srdf: Path | None = None,
     environment: Mapping[str, str] | None = None,
+    arguments: Mapping[str, str] | None = None,
 ) -> Draft:
     """Returns a scene file for a robot, what it carries and what stands around it, which was loaded once.
 
@@ -101,6 +102,7 @@ def draft(
         mounts: what the robot carries.
         srdf: SRDF file of the robot; None for one beside the model, if there is one.
         environment: the variables in which ROS lists places of packages; None for nowhere.
+        arguments: arguments of models that are written in xacro.
 
     Raises:
         SceneError: a file cannot be used; ``scene_package`` for a package that was not found; ``mount`` for a link that is missing.
@@ -110,9 +112,9 @@ def draft(
         parts[_unused(_name_in(part.path), parts)] = part
     models = {name: part.path for name, part in parts.items()}
     directory = out.parent.resolve()
-    looked = [packages_of(path, packages, environment or {}) for path in models.values()]
+    looked = [packages_of(path, packages, environment or {}, arguments or {}, directory) for path in models.values()]
     found, notes = {name: root for roots, _ in looked for name, root in roots.items()}, [note for _, said in looked for note in said]
-    head = _head(out, robot, found, directory)
+    head = _head(out, robot, found, arguments or {}, directory)
     add = {name: f"  - add_model: {{name: {_quoted(name)}, file: {_quoted(_relative(path, directory))}}}" for name, path in models.items()}
     held = _inventory("\n".join([head, *add.values()]), models, directory)
     own = [*parts][: 1 + len(mounts)]
@@ -208,20 +210,23 @@ def _name_in(path: Path) -> str:
     if not path.is_file():
         problem = f"{path} is a directory" if path.is_dir() else f"there is no file {path}"
         raise SceneError("scene_model", problem, hint="name a model file: URDF, SDFormat or MJCF")
-    parse_xml(path, path.name, "scene_model", install)
-    return next(filter(None, found[:1]), path.stem)
+    parse_xml(path.read_bytes(), path.name, "scene_model", install)
+    return next((name for name in found[:1] if name and "$" not in name), path.name.partition(".")[0])
 
 
 def _unused(name: str, taken: Collection[str]) -> str:
     return name if name not in taken else next(f"{name}_{i}" for i in range(2, 1000) if f"{name}_{i}" not in taken)
 
 
-def _head(out: Path, robot: Path, packages: Mapping[str, Path], directory: Path) -> str:
+def _head(out: Path, robot: Path, packages: Mapping[str, Path], arguments: Mapping[str, str], directory: Path) -> str:
     name = out.stem if out.stem != "scene" else directory.name
     lines = [f"# Drafted by ciris scene init for {robot.name}; docs/scenes.md explains every key.", f"name: {_quoted(name)}"]
     if packages:
         lines += ["# Where the packages are that models name as package:// or model://", "packages:"]
         lines += [f"  {_quoted(package)}: {_quoted(_relative(root, directory))}" for package, root in packages.items()]
+    if arguments:
+        lines += ["# What the model's xacro is given", "xacro:"]
+        lines += [f"  {_quoted(key)}: {_quoted(value)}" for key, value in arguments.items()]
     return "\n".join([*lines, "directives:"])
 
 

@@ -26,6 +26,7 @@ from certifier.scene.paths import beside
 KEYS = (
     *("name", "packages", "directives", "srdf", "q_star", "limits", "fix", "configurations", "padding", "ignore", "hulls", "mesh"),
     "cylinder_sides",
+    "xacro",
 )
 """The keys of a scene file."""
 MAX_BYTES = 2**20
@@ -61,6 +62,7 @@ class SceneFile:
         ignore: the pairs that are not certified.
         hulls: the bodies that one hull of all their polytopes stands for.
         max_vertices: greatest number of vertices that stand for a mesh or an ellipsoid.
+        xacro: arguments of models that are written in xacro.
         cylinder_sides: number of sides of the prism that stands for a cylinder.
         srdf: the SRDF file of a model, as written, by the model's name.
         configurations: positions by joint, or one for every joint, radians or metres, by the name of the configuration.
@@ -80,6 +82,7 @@ class SceneFile:
     hulls: tuple[str, ...] = ()
     max_vertices: int = 32
     cylinder_sides: int = 12
+    xacro: dict[str, str | int | float | bool] = field(default_factory=dict)
     srdf: dict[str, str] = field(default_factory=dict)
     configurations: dict[str, dict[str, float] | tuple[float, ...]] = field(default_factory=dict)
 
@@ -123,6 +126,7 @@ def read_scene_file(path: Path) -> SceneFile:
         cylinder_sides=_integer(values.get("cylinder_sides", 12), "cylinder_sides", minimum=3, maximum=MAX_SIDES),
         srdf=_srdf(values.get("srdf", {})),
         configurations=_configurations(values.get("configurations", {})),
+        xacro=_arguments(values.get("xacro", {})),
     )
 
 
@@ -341,6 +345,16 @@ def _hulls(value: Any) -> tuple[str, ...]:
     return tuple(dict.fromkeys(_string(name, f"hulls[{k}]") for k, name in enumerate(value)))
 
 
+def _arguments(value: Any) -> dict[str, str | int | float | bool]:
+    if not isinstance(value, dict):
+        raise _wrong("xacro", "must map names of arguments to text, numbers, true or false")
+    for name, argument in value.items():
+        _string(name, "xacro")
+        if not isinstance(argument, bool | int | float):
+            _sentence(argument, f"xacro.{name}")
+    return value
+
+
 def _check_directives(node: yaml.Node, name: str) -> None:
     if not isinstance(node, yaml.SequenceNode) or not node.value:
         raise _wrong("directives", "must be a list of Drake Model Directives with at least one entry")
@@ -355,8 +369,11 @@ def _check_directives(node: yaml.Node, name: str) -> None:
             raise _wrong("directives", f"line {added.line}: {added.file!a} is not a relative path", hint=hint)
 
 
-def with_relative_packages(path: Path) -> str:
-    """Returns the text of a scene file that has passed the schema, with absolute paths of packages made relative to its directory."""
+def for_bundle(path: Path) -> str:
+    """Returns the text of a scene file that has passed the schema, as it can travel.
+
+    Absolute paths of packages are relative to its directory, and there are no arguments of xacro: models travel expanded.
+    """
     text = _text(path)
     root = compose(text, path.name)
     assert isinstance(root, yaml.MappingNode), "it has passed the schema"
@@ -364,4 +381,8 @@ def with_relative_packages(path: Path) -> str:
     directory = os.path.abspath(path.parent)
     absolute = [node for node in roots if node.value.startswith("/")]
     relative = [json.dumps(os.path.relpath(node.value, directory), ensure_ascii=False) for node in absolute]
-    return replaced(text, 0, len(text), list(zip(absolute, relative, strict=True)))
+    changes = list(zip(absolute, relative, strict=True))
+    for key, node in root.value:
+        if key.value == "xacro":
+            changes.append((node, "{}" + "\n" * text[node.start_mark.index : node.end_mark.index].count("\n")))
+    return replaced(text, 0, len(text), sorted(changes, key=lambda change: change[0].start_mark.index))

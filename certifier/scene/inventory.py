@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -14,6 +15,7 @@ from pydrake.multibody.tree import BodyIndex, RigidBody
 from pydrake.systems.framework import DiagramBuilder
 
 from certifier.model import Joint
+from certifier.scene.copies import Copies
 from certifier.scene.file import read_scene_file
 from certifier.scene.mimics import Mimic, mimic_of
 from certifier.scene.names import Names
@@ -41,7 +43,8 @@ def inventory(payload: dict[str, Any]) -> dict[str, Any]:
     plant, scene_graph = AddMultibodyPlantSceneGraph(DiagramBuilder(), time_step=0.0)
     strict = StrictReader(scene_file)
     strict.check(scene_file.resolved_directives, path.name)
-    read_models(scene_file, plant, strict.working_directory)
+    with tempfile.TemporaryDirectory(dir=payload.get("scratch"), prefix="ciris-") as scratch:
+        read_models(scene_file, plant, Copies(scene_file, strict, Path(scratch)))
     names = Names(plant, scene_graph.model_inspector())
     without_limits(strict, plant, names)
     free = plant.GetFloatingBaseBodies()
@@ -87,7 +90,7 @@ def _unread(file: Path, model: str, joints: list[Joint]) -> list[Mimic]:
     def install(parser: expat.XMLParserType) -> None:
         parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = tree.start, tree.end, tree.data
 
-    parse_xml(file, file.name, "scene_model", install)
+    parse_xml(file.read_bytes(), file.name, "scene_model", install)
     own = [j.name for j in joints if j.name.startswith((f"{model}/", f"{model}::"))]
     full = {name.removeprefix(model).partition("/")[2]: name for name in own}
     found = []

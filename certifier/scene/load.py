@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,7 +35,9 @@ def load_scene(path: str | Path, *, timeout_s: float = TIMEOUT_S, memory_bytes: 
 
 
 def read_in_child(function: str, payload: dict[str, Any], name: str, timeout_s: float, memory_bytes: int) -> dict[str, Any]:
-    """Returns the document that ``function(payload)`` returns in a child process.
+    """Returns the document that a function returns in a child process.
+
+    The function gets the payload and, as its ``scratch``, the path of an empty directory for its files.
 
     Args:
         name: name of what is read, for people.
@@ -43,7 +46,9 @@ def read_in_child(function: str, payload: dict[str, Any], name: str, timeout_s: 
         SceneError: whatever the function raises, or ``scene_model_crash``.
     """
     try:
-        document: dict[str, Any] = run_in_child(function, payload, timeout_s=timeout_s, memory_bytes=memory_bytes)
+        with tempfile.TemporaryDirectory(prefix="ciris-") as scratch:  # it goes even if the child is killed
+            call = {**payload, "scratch": scratch}
+            document: dict[str, Any] = run_in_child(function, call, timeout_s=timeout_s, memory_bytes=memory_bytes)
     except SceneError:
         raise
     except CirisError as death:

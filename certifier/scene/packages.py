@@ -9,6 +9,8 @@ from pathlib import Path
 from xml.parsers import expat
 
 from certifier.errors import SceneError
+from certifier.scene.macros import Expander, in_xacro, packages_named
+from certifier.scene.paths import beside
 from certifier.scene.references import references
 from certifier.scene.xml import parse_xml
 
@@ -20,21 +22,39 @@ _INSTALLED = ("install/*/share", "install/share", "share")
 """Below such a directory, installed packages are here, each under its name."""
 
 
-def packages_of(model: Path, given: Mapping[str, Path], environment: Mapping[str, str]) -> tuple[dict[str, Path], list[str]]:
+def packages_of(
+    model: Path, given: Mapping[str, Path], environment: Mapping[str, str], arguments: Mapping[str, str], directory: Path
+) -> tuple[dict[str, Path], list[str]]:
     """Returns where the packages are that a model names, and sentences about those that are in several places.
+
+    A model that is written in xacro has to be in a package or below the directory of the scene file. If it is in neither, its own package
+    is among those returned, or else the directory that it is in.
 
     Args:
         given: directories of packages, by name. The others are looked for, and the nearest is taken.
         environment: AMENT_PREFIX_PATH and ROS_PACKAGE_PATH count after what is near the model.
+        arguments: of xacro.
+        directory: that of the scene file.
 
     Raises:
-        SceneError: ``scene_package`` for a package that was not found.
+        SceneError: ``scene_package`` for a package that was not found; ``scene_xacro`` for what xacro refuses.
     """
+
+    def at(name: str) -> list[Path]:
+        return [given[name]] if name in given else list(_places(name, model.absolute(), environment))
+
     found: dict[str, Path] = {}
-    said = []
-    written = [reference.partition("://")[2] for reference in references(model) if reference.startswith(_SCHEMES)]
+    said, expanded = [], None
+    if in_xacro(model, model.name):
+        found = packages_named(model, lambda name: next((place.absolute() for place in at(name) if place.is_dir()), None))
+        file = beside(Path.cwd(), str(model))
+        if not any(file.is_relative_to(root) for root in (directory, *found.values())):
+            own = next((above for above in file.parents if (above / _MANIFEST).is_file()), file.parent)
+            found[_named(own) or own.name] = own
+        expanded = Expander(directory, found, arguments).expanded(file, model.name)
+    written = [reference.partition("://")[2] for reference in references(model, expanded) if reference.startswith(_SCHEMES)]
     for name in dict.fromkeys(reference.partition("/")[0] for reference in written):
-        places = [given[name]] if name in given else list(_places(name, model.absolute(), environment))
+        places = at(name)
         if not places or not places[0].is_dir():
             looked = "above it, in a workspace around it, in AMENT_PREFIX_PATH or in ROS_PACKAGE_PATH"
             message = f"{model.name} names the package {name}, which is not {'there' if name in given else looked}"
@@ -101,7 +121,7 @@ def _named(directory: Path) -> str | None:
         parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = start, end, data
 
     try:
-        parse_xml(manifest, manifest.name, "scene_package", install)
+        parse_xml(manifest.read_bytes(), manifest.name, "scene_package", install)
     except (OSError, SceneError):
         return None
     return "".join(text).strip() or None

@@ -11,6 +11,7 @@ import logging
 import os
 import re
 import sys
+import tempfile
 import textwrap
 from dataclasses import replace
 from pathlib import Path
@@ -48,6 +49,7 @@ from certifier.positions import MAGNITUDE
 from certifier.scene import shapes
 from certifier.scene.census import check_counts
 from certifier.scene.configurations import own_configurations, srdf_configurations
+from certifier.scene.copies import Copies
 from certifier.scene.file import SceneFile, read_scene_file
 from certifier.scene.hollow import recorded
 from certifier.scene.hulls import with_hulls
@@ -79,13 +81,19 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
     Raises:
         SceneError: whatever is wrong with the file, the models it names or the scene they make.
     """
-    path = Path(payload["path"])
+    with tempfile.TemporaryDirectory(dir=payload.get("scratch"), prefix="ciris-") as scratch:
+        return _parsed(Path(payload["path"]), Path(scratch))
+
+
+def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
+    """Does the work of :func:`parse`; ``scratch`` is an empty directory."""
     scene_file = read_scene_file(path)
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
     strict = StrictReader(scene_file)
     written = strict.check(scene_file.resolved_directives, path.name)
-    warnings = read_models(scene_file, plant, strict.working_directory)
+    copies = Copies(scene_file, strict, scratch)
+    warnings = strict.notes + copies.warnings + read_models(scene_file, plant, copies)
     inspector = scene_graph.model_inspector()
     names = Names(plant, inspector)
     warnings += without_limits(strict, plant, names)
@@ -94,7 +102,7 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
     joints, q_star = centered(narrowed(held(every, at), scene_file.limits), scene_file.q_star)
     tree = Tree(joints, list(names.bodies))
     reached: dict[str, float] = {}
-    parts = _geometries(scene_file, strict, plant, inspector, tree, names, reached)
+    parts = _geometries(scene_file, strict, copies, plant, inspector, tree, names, reached)
     by_id = with_hulls(parts, scene_file.hulls, tree.bodies, scene_file.max_vertices, names.register, reached)
     candidates = list(dict.fromkeys((by_id[a].name, by_id[b].name) for a, b in inspector.GetCollisionCandidates()))
     geometries = tuple({id(geometry): geometry for geometry in by_id.values()}.values())
@@ -128,13 +136,10 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
     return document
 
 
-def read_models(scene_file: SceneFile, plant: MultibodyPlant, working_directory: Path) -> list[str]:
+def read_models(scene_file: SceneFile, plant: MultibodyPlant, copies: Copies) -> list[str]:
     """Adds the directives' models to the plant, finalises it and returns Drake's warnings.
 
     It prints the models' names first, because only what is printed remains if Drake ends the process.
-
-    Args:
-        working_directory: Drake looks there for what SDFormat includes by relative paths.
     """
     parser = Parser(plant)
     packages = parser.package_map()
@@ -143,18 +148,19 @@ def read_models(scene_file: SceneFile, plant: MultibodyPlant, working_directory:
     for name, root in scene_file.packages.items():
         packages.Add(name, str(root))
     print(f"reading {', '.join(scene_file.models)}", file=sys.stderr, flush=True)
-    with _DrakeLog() as log, contextlib.chdir(working_directory):
+    with _DrakeLog() as log, contextlib.chdir(copies.working_directory):
         try:
-            parser.AddModelsFromString(scene_file.resolved_directives, "dmd.yaml")
+            parser.AddModelsFromString(copies.directives, "dmd.yaml")
             plant.Finalize()
         except MemoryError:
             raise
         except (Exception, SystemExit) as error:
-            raise _model_error(scene_file, error) from None
-    for warning in log.messages:
+            raise _model_error(scene_file, copies.named(str(error))) from None
+    messages = list(map(copies.named, log.messages))
+    for warning in messages:
         if _IGNORED_SHAPE.search(warning):
             raise SceneError("unsupported_shape", _one_line(scene_file, warning), field="directives", hint="use a primitive or a mesh")
-    return list(dict.fromkeys(_one_line(scene_file, warning) for warning in log.messages))
+    return list(dict.fromkeys(_one_line(scene_file, warning) for warning in messages))
 
 
 def without_limits(strict: StrictReader, plant: MultibodyPlant, names: Names) -> list[str]:
@@ -187,12 +193,12 @@ class _DrakeLog(logging.Handler):
         logging.getLogger("drake").removeHandler(self)
 
 
-def _model_error(scene_file: SceneFile, error: BaseException) -> SceneError:
+def _model_error(scene_file: SceneFile, error: str) -> SceneError:
     """Returns what Drake raised as an error for people. Where it does not say which model it is about, the error names every model.
 
     Of a failed assertion (SystemExit in pydrake) the condition is said, and not where it stands in Drake's source.
     """
-    message = _one_line(scene_file, str(error))
+    message = _one_line(scene_file, error)
     where = re.search(r"directives\[\d+\]", message)
     message = message.split(" while accepting")[0]
     if assertion := re.search(r"condition '(.+)' failed", message):
@@ -275,6 +281,7 @@ def couplings(plant: MultibodyPlant, names: Names) -> list[Coupling]:
 def _geometries(
     scene_file: SceneFile,
     strict: StrictReader,
+    copies: Copies,
     plant: MultibodyPlant,
     inspector: SceneGraphInspector,
     tree: Tree,
@@ -294,7 +301,7 @@ def _geometries(
             half_spaces.append((i, name, body_name))
         else:
             X_BG = inspector.GetPoseInFrame(i)
-            convex = _convex(inspector.GetShape(i), name, scene_file, strict)
+            convex = _convex(inspector.GetShape(i), name, scene_file, strict, copies)
             found[i] = _placed(name, body_name, convex, X_BG)
             if convex.beyond:
                 reached[name] = convex.beyond
@@ -330,7 +337,7 @@ def _check_hull(geometry: Geometry) -> None:
             raise SceneError("scene_model", message, field="directives", hint=hint) from None
 
 
-def _convex(shape: Shape, name: str, scene_file: SceneFile, strict: StrictReader) -> shapes.Body:
+def _convex(shape: Shape, name: str, scene_file: SceneFile, strict: StrictReader, copies: Copies) -> shapes.Body:
     match shape:
         case Box():
             return shapes.box((shape.width(), shape.depth(), shape.height()))
@@ -343,19 +350,20 @@ def _convex(shape: Shape, name: str, scene_file: SceneFile, strict: StrictReader
         case Ellipsoid():
             return shapes.ellipsoid((shape.a(), shape.b(), shape.c()), scene_file.max_vertices)
         case Convex() | Mesh():
+            file = copies.original(Path(shape.source().description()))
             said = {
                 "kind": type(shape).__name__.lower(),
-                "file": escaped(Path(shape.source().description()).name),
+                "file": escaped(file.name),
                 "scale": shape.scale3().tolist(),
             }
-            points, triangles = _mesh(shape, strict)
+            points, triangles = _mesh(shape, strict, copies)
             return shapes.polytope(said, points, triangles, scene_file.max_vertices)
         case _:
             message = f"geometry {name} is a {type(shape).__name__}, which is not supported"
             raise SceneError("unsupported_shape", message, field="directives", hint="use a primitive or a mesh")
 
 
-def _mesh(shape: Convex | Mesh, strict: StrictReader) -> tuple[Array, NDArray[np.int64]]:
+def _mesh(shape: Convex | Mesh, strict: StrictReader, copies: Copies) -> tuple[Array, NDArray[np.int64]]:
     """Returns the points of a mesh, (k, 3), as its file has them, times the scale, and the numbers of the points of its triangles, (t, 3).
 
     First come those that are vertices of Drake's hull, in Drake's order, on which the hashes of scenes depend.
@@ -363,10 +371,11 @@ def _mesh(shape: Convex | Mesh, strict: StrictReader) -> tuple[Array, NDArray[np
     Raises:
         SceneError: Drake has taken a file that the models do not name, or a coordinate of a scaled point is above MAGNITUDE.
     """
-    mesh = strict.taken(shape.source().path())
+    file = copies.original(shape.source().path())
+    mesh = strict.taken(file)
     points = mesh.points * shape.scale3()
     if not (np.abs(points) <= MAGNITUDE).all():
-        message = f"a coordinate of {escaped(shape.source().path().name)} is above {MAGNITUDE:g} m"
+        message = f"a coordinate of {escaped(file.name)} is above {MAGNITUDE:g} m"
         raise SceneError("scene_model", message, field="directives", hint="mend the file or the scale")
     hull = shape.GetConvexHull()
     rank = {tuple(hull.vertex(k)): k for k in range(hull.num_vertices())}

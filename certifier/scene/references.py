@@ -31,8 +31,11 @@ _EXPORT = "export the mesh again"
 _SCHEME = re.compile(r"^([a-zA-Z][\w+.-]*):(//)?")
 
 
-def references(path: Path) -> list[str]:
+def references(path: Path, expanded: bytes | None = None) -> list[str]:
     """Returns the references in one file, as written; a kind of file that refers to nothing has none.
+
+    Args:
+        expanded: what a model expands to that is written in xacro.
 
     Raises:
         SceneError: ``bundle_file`` for a kind of file that has no place in a scene, ``bundle_xml`` for XML that is broken or declares a
@@ -44,7 +47,7 @@ def references(path: Path) -> list[str]:
         kinds = ", ".join(sorted(_READERS))
         raise SceneError("bundle_file", f"{path.name}: files of this kind are not part of a scene", hint=f"known kinds: {kinds}") from None
     try:
-        return read(path)
+        return read(path) if expanded is None else _xml(path, expanded)
     except UnicodeDecodeError as error:
         raise SceneError("bundle_text", f"{path.name}: byte {error.start} is not UTF-8 text", hint="save the file as UTF-8") from None
     except (json.JSONDecodeError, RecursionError):
@@ -88,7 +91,7 @@ def mjcf_references(path: Path, packages: dict[str, Path]) -> list[Path]:
     """
     files, names, directories = [path], [""], ["."]
     for file in files:
-        written, below = _written(file)
+        written, below = _written(file, file.read_bytes())
         names += written
         directories += below
         included = [resolve(name, path.parent, packages) for name in written if is_mjcf(Path(name))]
@@ -96,12 +99,12 @@ def mjcf_references(path: Path, packages: dict[str, Path]) -> list[Path]:
     return [resolve(name, path.parent / directory, packages) for directory in directories for name in names if name]
 
 
-def _xml(path: Path) -> list[str]:
-    found, directories = _written(path)
+def _xml(path: Path, data: bytes | None = None) -> list[str]:
+    found, directories = _written(path, path.read_bytes() if data is None else data)
     return found + [f"{directory}/{value}" for directory in directories for value in found]
 
 
-def _written(path: Path) -> tuple[list[str], list[str]]:
+def _written(path: Path, data: bytes) -> tuple[list[str], list[str]]:
     """Returns the references in an XML file, and the directories below which MJCF looks for some of them."""
     found: list[str] = []
     directories: list[str] = []
@@ -109,7 +112,7 @@ def _written(path: Path) -> tuple[list[str], list[str]]:
     text: list[str] = []
 
     def unread() -> bool:
-        return _GAZEBO in stack and path.suffix.lower() == ".urdf"
+        return _GAZEBO in stack and path.suffix.lower() in (".urdf", ".xacro")
 
     def start(name: str, attributes: dict[str, str]) -> None:
         stack.append(name)
@@ -129,7 +132,7 @@ def _written(path: Path) -> tuple[list[str], list[str]]:
     def install(parser: expat.XMLParserType) -> None:
         parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = start, end, text.append
 
-    parse_xml(path, path.name, "bundle_xml", install)
+    parse_xml(data, path.name, "bundle_xml", install)
     if any(".." in Path(value).parts for value in directories):
         message = f"{path.name}: .. is not accepted in {', '.join(sorted(_DIRECTORIES))}"
         raise SceneError("bundle_uri", message, hint="keep the files below the directory of the model")
@@ -170,7 +173,7 @@ def _nothing(_: Path) -> list[str]:
 
 
 _READERS: dict[str, Callable[[Path], list[str]]] = {
-    **dict.fromkeys((".urdf", ".sdf", *_MJCF), _xml),
+    **dict.fromkeys((".urdf", ".sdf", ".xacro", *_MJCF), _xml),
     **dict.fromkeys((".yaml", ".yml"), _yaml),
     ".obj": _obj,
     ".gltf": _gltf,

@@ -15,23 +15,24 @@ from certifier.positions import MAGNITUDE
 from certifier.scene.directives import AddedFile, added_by
 from certifier.scene.file import SceneFile
 from certifier.scene.formats.mjcf import Mjcf
-from certifier.scene.formats.model_file import MeshReference, ModelFile, Reference
+from certifier.scene.formats.model_file import FileReference, MeshReference, ModelFile, Reference
 from certifier.scene.formats.sdf import Sdf
 from certifier.scene.formats.urdf import Urdf
+from certifier.scene.macros import EXPANDED, XACRO, Expander, in_xacro, root_of
+from certifier.scene.meshes.mesh import Mesh
+from certifier.scene.meshes.read import MESHES, read_mesh
 from certifier.scene.nodes import read_yaml
-from certifier.scene.obj import ObjMesh, read_mesh
 from certifier.scene.paths import beside
 from certifier.scene.references import resolve
 
 _FORMATS: dict[str, type[ModelFile]] = {".urdf": Urdf, ".sdf": Sdf, ".xml": Mjcf}
-_OBJ = ".obj"
 _BY_PACKAGE = "write model://NAME/FILE, and name the directory of the file as NAME under packages in the scene file"
 _Read = tuple[Path, type[ModelFile] | None, tuple[str, ...]]
 """A model file and its format; or a file of directives, None, and the namespace of what it adds."""
 
 
 class StrictReader:
-    """Reads OBJ meshes and the model files that a scene's directives lead to, also through includes. It finds files as Drake does.
+    """Reads the meshes and the model files that a scene's directives lead to, also through includes. It finds files as Drake does.
 
     Attributes:
         working_directory: the directory in which Drake has to read the models. Relative paths of SDFormat's includes start there.
@@ -40,37 +41,46 @@ class StrictReader:
 
     def __init__(self, scene_file: SceneFile) -> None:
         self._packages, self._root = scene_file.packages, Path(os.path.abspath(scene_file.path.parent))
+        self._expander = Expander(self._root, scene_file.packages, scene_file.xacro)
+        self._expanded: set[Path] = set()
         self.unlimited: list[tuple[str, str]] = []
-        self._meshes: dict[Path, ObjMesh] = {}
+        self._meshes: dict[Path, Mesh] = {}
         self._models: dict[tuple[Path, type[ModelFile]], ModelFile] = {}
         self._counts: dict[_Read, int] = {}
         self._starts: set[Path] = set()
 
     @property
+    def notes(self) -> list[str]:
+        """One line about the meshes that say that another axis than z is up, if there are any."""
+        turned = [f"{self.name(path)} ({mesh.up})" for path, mesh in self._meshes.items() if mesh.up]
+        more = f" and {len(turned) - 1} more" if len(turned) > 1 else ""
+        return [f"the up_axis of {turned[0]}{more} is not applied, as in RViz and MoveIt; coordinates stay as they stand"] if turned else []
+
+    @property
     def working_directory(self) -> Path:
         return next(iter(self._starts), self._root)
 
-    def mesh(self, path: Path) -> ObjMesh:
-        """Returns the mesh of an OBJ file, as written there.
+    def mesh(self, path: Path) -> Mesh:
+        """Returns the mesh of a file, as written there.
 
         Raises:
             SceneError: ``scene_model``, with file and line, when the file is not accepted or is a mesh of another kind.
         """
-        if path.suffix.lower() != _OBJ:
-            raise _not_read(self._name(path))
-        path = path.resolve()
+        if path.suffix.lower() not in MESHES:
+            raise _not_read(self.name(path))
+        name, path = self.name(path), path.resolve()
         if path not in self._meshes:
-            self._meshes[path] = read_mesh(path, self._name(path))
+            self._meshes[path] = read_mesh(path, name)
         return self._meshes[path]
 
-    def taken(self, path: Path) -> ObjMesh:
+    def taken(self, path: Path) -> Mesh:
         """Returns the mesh of a file that Drake has taken.
 
         Raises:
             SceneError: ``scene_model``, when no model and no directive led :meth:`check` to this file.
         """
         if (mesh := self._meshes.get(path.resolve())) is None:
-            message = f"Drake has taken another mesh than the models name: {self._name(path)}"
+            message = f"Drake has taken another mesh than the models name: {self.name(path)}"
             raise SceneError("scene_model", message, field="directives", hint=_BY_PACKAGE)
         return mesh
 
@@ -89,7 +99,9 @@ class StrictReader:
         Raises:
             SceneError: ``scene_model``, with file and line, or ``scene_yaml``.
         """
-        return self._added_by(directives, name, (), ())
+        count = self._added_by(directives, name, (), ())
+        self._expander.check_arguments()
+        return count
 
     def _added_by(self, directives: str, name: str, namespace: tuple[str, ...], around: tuple[_Read, ...]) -> int:
         """Returns the number of collision geometries that a document of directives adds.
@@ -109,25 +121,25 @@ class StrictReader:
         Args:
             name: name of the document, for people.
         """
-        path, suffix = self._found(added, name), _suffix(added.file).lower()
+        path, suffix = self.found(added, name), _suffix(added.file).lower()
         if path.is_dir():
-            raise SceneError("scene_model", f"{self._name(path)} is a directory", field="directives", hint="name a model file in it")
+            raise SceneError("scene_model", f"{self.name(path)} is a directory", field="directives", hint="name a model file in it")
         if added.kind == "add_directives":
-            name = self._name(path)
+            name = self.name(path)
             return self._once((path, None, named), around, lambda around: self._added_by(read_yaml(path, name), name, named, around))
-        if suffix == _OBJ:
+        if suffix in MESHES:
             self.mesh(path)
             return 1
-        if suffix not in _FORMATS:
+        if suffix not in (*_FORMATS, XACRO):
             raise SceneError(
-                "scene_model", f"{self._name(path)} is no model", field="directives", hint=f"models end in {', '.join(_FORMATS)}"
+                "scene_model", f"{self.name(path)} is no model", field="directives", hint=f"models end in {', '.join((*_FORMATS, XACRO))}"
             )
-        model = self._read(path, _FORMATS[suffix])
+        model = self.model(path, self.kind(path))
         if isinstance(model, Urdf):
             self.unlimited += [("::".join(named), joint.file) for joint in model.unlimited]
         return self._counted(model, path, around)
 
-    def _found(self, added: AddedFile, name: str) -> Path:
+    def found(self, added: AddedFile, name: str) -> Path:
         """Returns the file that a directive adds. Drake is not asked for one that is not found here."""
         where = f"{name}:{added.line}"
         try:
@@ -139,13 +151,34 @@ class StrictReader:
             raise SceneError("scene_model", f"{where}: {error.message}", field="directives", hint=error.hint) from None
         if not path.exists():
             hint = "a relative path starts at the directory of the scene file, and that of package://NAME/FILE at the package"
-            raise SceneError("scene_model", f"{where}: there is no file {self._name(path)}", field="directives", hint=hint)
+            raise SceneError("scene_model", f"{where}: there is no file {self.name(path)}", field="directives", hint=hint)
         return path
 
-    def _read(self, file: Path, kind: type[ModelFile]) -> ModelFile:
+    def model(self, file: Path, kind: type[ModelFile]) -> ModelFile:
+        """Returns a model file, which is read once."""
         if (file, kind) not in self._models:
-            self._models[file, kind] = kind(file, self._name(file))
+            content = self._content(file)  # from now on, the name says whether it is expanded
+            self._models[file, kind] = kind(file, self.name(file), content)
         return self._models[file, kind]
+
+    def kind(self, file: Path) -> type[ModelFile]:
+        """Returns the format of a model file: what its name says, or its root where it ends in .xacro."""
+        suffix = file.suffix.lower()
+        if suffix != XACRO:
+            return _FORMATS[suffix]
+        return Sdf if root_of(self._content(file), self.name(file)) == "sdf" else Urdf
+
+    def _content(self, file: Path) -> bytes:
+        """Returns the content of a model file, expanded."""
+        if not in_xacro(file, self.name(file)):
+            return file.read_bytes()
+        content = self._expander.expanded(file, self.name(file))
+        self._expanded.add(file)
+        return content
+
+    def adapted(self, file: Path) -> bool:
+        """Says whether Drake cannot read a model file in place, whatever it holds."""
+        return file in self._expanded or file.suffix.lower() == XACRO
 
     def _counted(self, model: ModelFile, file: Path, around: tuple[_Read, ...]) -> int:
         """Checks the meshes and the includes of a model, and returns how many collision geometries it has with them."""
@@ -158,13 +191,14 @@ class StrictReader:
             self._check_mesh(model, mesh, file.parent, added)
         count = len(model.collisions)
         for include in model.includes:
-            found = self._included(model, include, file.parent)
-            included = self._read(found, _FORMATS[_suffix(include.file)])
+            found = self.included(model, include, file.parent)
+            included = self.model(found, _FORMATS[_suffix(include.file)])
             count += self._counted(included, found, around)
         return count
 
-    def _included(self, model: ModelFile, include: Reference, start: Path) -> Path:
-        found = self._located(include.file, [start])
+    def included(self, model: ModelFile, include: FileReference, start: Path) -> Path:
+        """Returns the model file that one of a directory includes."""
+        found = self.located(include.file, [start])
         if found is None:
             hint = f"a relative path starts at the directory of the model; or {_BY_PACKAGE}"
             self._refuse(model, include, "is no file that was found", hint)
@@ -190,7 +224,7 @@ class StrictReader:
     def _once(self, read: _Read, around: tuple[_Read, ...], count: Callable[[tuple[_Read, ...]], int]) -> int:
         """Returns the count of a file, which is read only once."""
         if read in around:
-            message = f"{self._name(read[0])} includes itself, or a file that includes it"
+            message = f"{self.name(read[0])} includes itself, or a file that includes it"
             raise SceneError("scene_model", message, field="directives", hint="remove the circle")
         if read not in self._counts:
             self._counts[read] = count((*around, read))
@@ -198,16 +232,17 @@ class StrictReader:
 
     def _check_mesh(self, model: ModelFile, mesh: MeshReference, start: Path, added: Path) -> None:
         """Checks a mesh. Drake looks for it from the model that the directive adds, also where an included file names it."""
-        if _suffix(mesh.file).lower() != _OBJ:
+        if _suffix(mesh.file).lower() not in MESHES:
             raise _not_read(f"{model.name}:{mesh.line}: {mesh.file[:200]!a}")
         if "://" not in mesh.file.removeprefix("file://") and (added / mesh.file).resolve() != (start / mesh.file).resolve():
             self._refuse(model, mesh, "is beside an included model, and Drake would look beside the model that includes it", _BY_PACKAGE)
-        if (path := self._located(mesh.file, [start / directory for directory in model.mesh_directories])) is not None:
+        if (path := self.located(mesh.file, [start / directory for directory in model.mesh_directories])) is not None:
             reach = float(np.abs(self.mesh(path).points * mesh.scale).max())
             if reach > MAGNITUDE:
                 self._refuse(model, mesh, f"has a coordinate of {reach:g} m; at most {MAGNITUDE:g} m is read", "mend the file or the scale")
 
-    def _located(self, reference: str, directories: Iterable[Path]) -> Path | None:
+    def located(self, reference: str, directories: Iterable[Path]) -> Path | None:
+        """Returns the file that a reference means in a file of one of the directories, or None where there is none."""
         reference = reference.removeprefix("file://")
         for directory in directories:
             try:
@@ -224,8 +259,10 @@ class StrictReader:
         message = f"{model.name}:{reference.line}: {reference.file[:200]!a} {what}"
         raise SceneError("scene_model", message, field="directives", hint=hint)
 
-    def _name(self, path: Path) -> str:
-        return escaped(path.relative_to(self._root).as_posix() if path.is_relative_to(self._root) else path.name)
+    def name(self, path: Path) -> str:
+        """Returns the name of a file for people."""
+        behind = EXPANDED if path in self._expanded else ""
+        return escaped(path.relative_to(self._root).as_posix() if path.is_relative_to(self._root) else path.name) + behind
 
 
 def _suffix(reference: str) -> str:
@@ -233,5 +270,6 @@ def _suffix(reference: str) -> str:
 
 
 def _not_read(what: str) -> SceneError:
-    hint = "convert it to OBJ; meshes that are only drawn may be of another kind"
-    return SceneError("scene_model", f"{what} is collision geometry, and of that only OBJ meshes are read", field="directives", hint=hint)
+    message = f"{what} is collision geometry, and of that only OBJ, STL and DAE meshes are read"
+    hint = "convert it to one of these; meshes that are only drawn may be of another kind"
+    return SceneError("scene_model", message, field="directives", hint=hint)

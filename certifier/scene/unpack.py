@@ -10,6 +10,7 @@ from typing import Any
 from certifier.errors import SceneError
 from certifier.scene.bundle import INDEX, SMALLER, BundleLimits
 from certifier.scene.file import read_scene_file
+from certifier.scene.macros import in_xacro
 from certifier.scene.parse import parse
 from certifier.scene.references import is_mjcf, references, resolve
 
@@ -49,6 +50,9 @@ def check_bundle(root: Path, scene: Path) -> None:
         _inside(resolve(srdf, scene.parent, packages), root, f"srdf.{model}")
     for file in sorted(f for f in root.rglob("*") if f.is_file() and f.name != INDEX):
         where = file.relative_to(root).as_posix()
+        if in_xacro(file, where):
+            message = f"{where} is written in xacro, and a bundle has its expansion"
+            raise SceneError("bundle_file", message, hint="make the bundle with `ciris scene add`, which expands it")
         for reference in references(file):
             if is_mjcf(file) and ".." in PurePosixPath(reference).parts:
                 raise SceneError("bundle_uri", f"{where}: {reference!r}: .. is not accepted here", hint=_BELOW)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from xml.parsers import expat
 
 from certifier.errors import SceneError
 
 
-def parse_xml(path: Path, name: str, code: str, install: Callable[[expat.XMLParserType], None]) -> None:
-    """Runs expat over a file.
+def parse_xml(data: bytes, name: str, code: str, install: Callable[[expat.XMLParserType], None]) -> None:
+    """Runs expat over the content of a file.
 
     Args:
         name: the file's name for people.
@@ -29,7 +28,7 @@ def parse_xml(path: Path, name: str, code: str, install: Callable[[expat.XMLPars
     install(parser)
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
     try:
-        parser.Parse(path.read_bytes(), True)
+        parser.Parse(data, True)
     except expat.ExpatError as error:
         message = f"{name}:{error.lineno}: this is not XML: {expat.ErrorString(error.code)}"
         raise SceneError(code, message, field="directives", hint="mend the file there") from None

@@ -15,7 +15,7 @@ def add(verbs: Any) -> None:
         help="write a scene file and a seed for a robot's model",
         epilog="Example: ciris scene init arm.urdf --mount gripper.urdf@tool0@0,0,0.02 --world table.sdf@0.5,0,0. Nothing is overwritten.",
     )
-    init.add_argument("robot", metavar="ROBOT", help="model file: URDF, SDFormat or MJCF")
+    init.add_argument("robot", metavar="ROBOT", help="model file: URDF, SDFormat, MJCF or xacro")
     init.add_argument(
         "--mount",
         metavar="FILE@LINK[@X,Y,Z[,R,P,Y]]",
@@ -40,6 +40,7 @@ def add(verbs: Any) -> None:
         help="directory of a package that a model names; default: the nearest in the directories above, in a ROS workspace around them, in "
         "AMENT_PREFIX_PATH or in ROS_PACKAGE_PATH; may be repeated",
     )
+    init.add_argument("--xacro", metavar="NAME=VALUE", action="append", default=[], help="argument of a model in xacro; may be repeated")
     init.add_argument(
         "--out",
         metavar="FILE",

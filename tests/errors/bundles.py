@@ -14,13 +14,15 @@ def link() -> tuple[zipfile.ZipInfo, str]:
     return entry, "/etc/passwd"
 
 
+XACRO = "<robot xmlns:xacro='http://www.ros.org/wiki/xacro'><xacro:property name='x' value='1'/></robot>"
+
 BUNDLES: Table = {
     ("bundle_too_large", "bundle"): [
         lambda t: load_bundle(bytes(9), BundleLimits(bytes=8)),
         lambda t: t.unpack(*((f"{i}.obj", "") for i in range(1001))),
         lambda t: load_bundle(t.pack(), BundleLimits(unpacked_bytes=100)),
     ],
-    ("bundle_file", ""): [lambda t: t.stranger(run__sh="true")],
+    ("bundle_file", ""): [lambda t: t.stranger(run__sh="true"), lambda t: t.stranger(arm__urdf=XACRO)],
     ("bundle_text", ""): [lambda t: t.stranger(m__gltf=b"\xff\xfe"), lambda t: t.stranger(m__gltf="{"), lambda t: t.stranger(m__gltf="[]")],
     ("bundle_uri", ""): [
         lambda t: t.pack(shape='<mesh filename="/m.obj"/>'),

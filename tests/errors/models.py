@@ -120,7 +120,6 @@ MODELS: Table = {
         lambda t: t.scene(**model("<asset><mesh file='m.obj'/><mesh name='m' file='n.obj'/></asset>")),
         lambda t: t.scene(**body("<geom type='mesh' mesh='m'/>")),
         lambda t: t.scene(**model("<asset><mesh name='m'/></asset><worldbody><geom type='mesh' mesh='m'/></worldbody>")),
-        lambda t: t.scene(**model("<asset><mesh file='m.stl'/></asset>")),
         lambda t: t.scene(**model("<worldbody><geom name='a' size='1' contype='0' conaffinity='0'/></worldbody>" + PAIR)),
         lambda t: t.scene(**model("<worldbody><geom name='a' size='1'/></worldbody><contact><pair geom1='a' geom2='a'/></contact>")),
         lambda t: t.scene(**model("<worldbody><geom name='a' size='1'/></worldbody><contact><pair geom1='aa' geom2='a'/></contact>")),

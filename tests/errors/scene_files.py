@@ -46,6 +46,7 @@ SCENE_FILES: Table = {
     ("scene_field", ""): [lambda t: t.load("- a\n"), lambda t: t.load(D + "? [a, b]\n: c\n")],
     ("scene_field", "ignored"): [lambda t: t.load(D + "ignored: []\n")],
     ("scene_field", "zzz"): [lambda t: t.load(D + "zzz: []\n")],
+    ("scene_field", "xacro"): [lambda t: t.load(D + "xacro: 3\n")],
     ("scene_field", "mesh"): [lambda t: t.load(D + "mesh: 3\n")],
     ("scene_field", "ignore[0][1]"): [lambda t: t.load(D + "ignore: [[a, 3]]\n")],
     ("scene_field", "ignore[0].reason"): [lambda t: t.load(D + "ignore: [{pair: [a, b], reason: 3}]\n")],

@@ -55,7 +55,7 @@ def mesh(text: str | bytes) -> dict[str, object]:
 
 
 def drafted(t: Trial, robot: Path) -> None:
-    draft(robot, [], t.directory / "scene.yaml", {})
+    draft(robot, [], t.directory / "scene.yaml", {}, {})
 
 
 def beside(t: Trial) -> None:
@@ -85,6 +85,12 @@ def below(t: Trial) -> None:
     t.scene(files={"room.sdf": INCLUDE.format("sub/b.sdf")})
 
 
+def unreadable(t: Trial) -> None:
+    """Loads a model whose mesh is a directory."""
+    (t.directory / "m.obj").mkdir()
+    t.scene(shape='<mesh filename="m.obj"/>')
+
+
 INCLUDE = '<sdf version="1.7"><model name="room"><include><uri>{}</uri></include></model></sdf>'
 OBJ = {
     "arm__urdf": "<robot name='arm'><link name='base'><collision><geometry><mesh filename='m.obj'/></geometry></collision></link></robot>"
@@ -104,6 +110,8 @@ SCENES: Table = {
         lambda t: t.scene(**mesh("# nothing\n")),
         lambda t: t.scene(**mesh("v 0 0 0\n")),
         lambda t: t.scene(shape='<mesh filename="nothing.obj"/>'),
+        lambda t: t.scene(shape='<mesh filename="m.vtk"/>'),
+        unreadable,
         lambda t: t.scene(TWICE + "- add_model: {name: n, file: m.xml}\n", files={"m.xml": IN_WORLD}),
         lambda t: t.scene(files={"room.sdf": '<sdf version="1.9"><world name="w"/></sdf>'}),
         lambda t: t.scene(f"{SCENE}{ADDED_MESH}", files={"m.obj": FAR_MESH}),

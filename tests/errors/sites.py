@@ -21,7 +21,9 @@ MAKERS = {
     ("certifier/scene/directives.py", "_refuse"): 2,
     ("certifier/scene/file.py", "_wrong"): 1,
     ("certifier/scene/formats", "refuse"): 1,
-    ("certifier/scene/obj.py", "refuse"): 1,
+    ("certifier/scene/expansion.py", "_refuse"): 1,
+    ("certifier/scene/meshes", "refuse"): 1,
+    ("certifier/scene/meshes/dae.py", "_refuse"): 1,
     ("certifier/scene/strict.py", "_refuse"): 2,
     ("certifier/seeding/options.py", "_refuse"): 1,
 }

@@ -11,7 +11,8 @@ from certifier.scene.formats.mjcf_defaults import Defaults
 from certifier.scene.formats.mjcf_geoms import Geom, Meshes
 from certifier.scene.formats.mjcf_names import check_names
 from certifier.scene.formats.mjcf_tree import Node, read_tree, refuse
-from certifier.scene.formats.model_file import MeshReference, ModelFile, Reference
+from certifier.scene.formats.model_file import FileReference, MeshReference, ModelFile, Reference
+from certifier.scene.formats.places import value_at
 
 _VALUES = {
     "angle": "degree|radian",
@@ -25,10 +26,18 @@ _VALUES = {
 
 
 class Mjcf(ModelFile):
-    """Reads an MJCF model with the files that it includes. Its ``collisions`` are the geoms that may collide, by name or else by type."""
+    """Reads an MJCF model with the files that it includes. Its ``collisions`` are the geoms that may collide, by name or else by type.
 
-    def _read(self, path: Path) -> None:
-        root = read_tree(path, self.name)
+    Attributes:
+        parts: the files that are part of it, each where another one includes it.
+    """
+
+    parts: list[tuple[FileReference, Path]]
+
+    def _read(self) -> None:
+        tree = read_tree(self._path, self.name, self._data)
+        root, self.sources = tree.root, tree.sources
+        self.parts = [(self._reference(node), path) for node, path in tree.includes]
         check_names(root)
         autolimits = self._compile(root.under("compiler"))
         defaults = Defaults(root)
@@ -49,7 +58,7 @@ class Mjcf(ModelFile):
         _check_drakes_names(root)
         meshes = [node for node in placed if node.name == "mesh"]
         scales = {id(node): defaults.attributes(node).get("scale", "1 1 1") for node in meshes}
-        self._check_geoms(geoms, Meshes(meshes), scales)
+        self._check_geoms(geoms, meshes, Meshes(meshes), scales)
         check_contacts(root.under("contact"), geoms, bodies)
         _check_constraints(root)
 
@@ -67,7 +76,7 @@ class Mjcf(ModelFile):
                     self.mesh_directories = [node.attributes[key] or "."]
         return autolimits
 
-    def _check_geoms(self, geoms: list[Geom], meshes: Meshes, scales: dict[int, str]) -> None:
+    def _check_geoms(self, geoms: list[Geom], every: list[Node], meshes: Meshes, scales: dict[int, str]) -> None:
         solid: list[Node] = []
         for geom in geoms:
             geom.check()
@@ -76,10 +85,15 @@ class Mjcf(ModelFile):
                 self.collisions.append(Reference(geom.node.attributes.get("name", geom.kind), geom.node.line))
                 if mesh is not None and not any(mesh is other for other in solid):
                     solid.append(mesh)
-        meshes.check_kinds(solid)
         for mesh in solid:
             x, y, z = map(float, scales[id(mesh)].split())
-            self.meshes.append(MeshReference(mesh.attributes["file"], mesh.line, (x, y, z)))
+            self.meshes.append(MeshReference(**vars(self._reference(mesh)), scale=(x, y, z)))
+        drawn = [mesh for mesh in every if "file" in mesh.attributes and not any(mesh is other for other in solid)]
+        self.drawn = [self._reference(mesh) for mesh in drawn]
+
+    def _reference(self, node: Node) -> FileReference:
+        place = value_at(self.sources[node.source], node.start, "file")
+        return FileReference(node.attributes["file"], node.line, node.source, place)
 
 
 def _read_inside(part: Node) -> list[Node]:

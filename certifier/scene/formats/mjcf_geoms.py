@@ -18,7 +18,6 @@ _KINDS = (*_SIZES, "plane", "mesh")
 _BITS = re.compile(r"[+-]?[0-9]{1,9}")
 _SHORT = 1e-6
 """MuJoCo takes the ends of a fromto for the same point if they are nearer to each other than something less than this, in metres."""
-_OBJ = ".obj"
 
 
 @dataclass(frozen=True)
@@ -113,18 +112,3 @@ class Meshes:
         if "file" not in node.attributes:
             refuse(node, "the <mesh> has no file, and Drake reads meshes only from files")
         return node
-
-    def check_kinds(self, solid: list[Node]) -> None:
-        """Checks that every file is OBJ, because Drake takes no other one.
-
-        Args:
-            solid: the meshes of geoms that may collide.
-
-        Raises:
-            SceneError: ``scene_model`` with file and line.
-        """
-        for node in self._nodes.values():
-            file = node.attributes.get("file", _OBJ)
-            if not file.lower().endswith(_OBJ):
-                what = "is collision geometry, and of that" if any(node is mesh for mesh in solid) else "is only drawn, but from MJCF"
-                refuse(node, f"{file[:200]!a} {what} only OBJ meshes are read", hint="convert it to OBJ, or remove what is only drawn")

@@ -24,6 +24,7 @@ class Node:
     """An element, the file and the line where it stands, and the elements in it.
 
     Attributes:
+        source, start: the path of the file, and the byte at which the element's start tag begins.
         childclass: the class of defaults that the bodies around it, and itself if it is one, give to what is in it.
     """
 
@@ -34,6 +35,8 @@ class Node:
     parent: Node | None = None
     children: list[Node] = field(default_factory=list)
     childclass: str | None = None
+    source: Path = Path()
+    start: int = 0
 
     def under(self, *names: str) -> list[Node]:
         """Returns the children with one of these names."""
@@ -71,8 +74,22 @@ def numbers(node: Node, key: str, counts: tuple[int, ...]) -> list[float]:
     return found
 
 
-def read_tree(path: Path, name: str) -> Node:
-    """Returns the root of a model. Paths of <include> start at the directory of the model's first file, also in files that it includes.
+@dataclass(frozen=True)
+class Tree:
+    """A model.
+
+    Attributes:
+        sources: the content of its files, by their paths.
+        includes: the elements that include some of them, and which.
+    """
+
+    root: Node
+    sources: dict[Path, bytes]
+    includes: list[tuple[Node, Path]]
+
+
+def read_tree(path: Path, name: str, data: bytes) -> Tree:
+    """Reads a model. Paths of <include> start at the directory of the model's first file, also in files that it includes.
 
     Args:
         name: the first file's name for people.
@@ -80,22 +97,22 @@ def read_tree(path: Path, name: str) -> Node:
     Raises:
         SceneError: ``scene_model`` with file and line, for what is not XML and for an <include> that cannot be followed.
     """
-    root = _read(path, name)
-    read, waiting = {path.resolve()}, [root]
+    tree = Tree(_read(path, name, data), {path: data}, [])
+    read, waiting = {path.resolve()}, [tree.root]
     for node in waiting:
         before, node.children = deque(node.children), []
         while before:
             child = before.popleft()
             if child.name == "include":
-                before.extendleft(reversed(_included(child, path, name, read).children))
+                before.extendleft(reversed(_included(child, path, name, read, tree).children))
             else:
                 child.parent, child.childclass = node, child.attributes.get("childclass", node.childclass)
                 node.children.append(child)
         waiting += node.children
-    return root
+    return tree
 
 
-def _included(node: Node, path: Path, name: str, read: set[Path]) -> Node:
+def _included(node: Node, path: Path, name: str, read: set[Path], tree: Tree) -> Node:
     file = node.attributes.get("file", "")
     if node.attributes.keys() != {"file"} or node.children:
         refuse(node, "<include> must have the attribute file and nothing else")
@@ -106,16 +123,19 @@ def _included(node: Node, path: Path, name: str, read: set[Path]) -> Node:
     if found.resolve() in read:
         refuse(node, f"{file[:200]!a} is included twice, which MuJoCo does not accept")
     read.add(found.resolve())
-    return _read(found, escaped(posixpath.normpath(posixpath.join(posixpath.dirname(name), file))))
+    tree.sources[found] = found.read_bytes()
+    tree.includes.append((node, found))
+    included = escaped(posixpath.normpath(posixpath.join(posixpath.dirname(name), file)))
+    return _read(found, included, tree.sources[found])
 
 
-def _read(path: Path, name: str) -> Node:
+def _read(path: Path, name: str, data: bytes) -> Node:
     top = Node("", name, 0, {})
     opened = [top]
 
     def install(parser: expat.XMLParserType) -> None:
         def start(element: str, attributes: dict[str, str]) -> None:
-            node = Node(element, name, parser.CurrentLineNumber, attributes)
+            node = Node(element, name, parser.CurrentLineNumber, attributes, source=path, start=parser.CurrentByteIndex)
             opened[-1].children.append(node)
             opened.append(node)
 
@@ -124,5 +144,5 @@ def _read(path: Path, name: str) -> Node:
 
         parser.StartElementHandler, parser.EndElementHandler = start, end
 
-    parse_xml(path, name, "scene_model", install)
+    parse_xml(data, name, "scene_model", install)
     return top.children[0]

@@ -17,6 +17,7 @@ from typing import ClassVar, NoReturn
 from xml.parsers import expat
 
 from certifier.errors import SceneError
+from certifier.scene.formats.places import Place, element_at, text_at, value_at
 from certifier.scene.formats.ranges import DIRECTION, RANGE_HINT, Range
 from certifier.scene.xml import parse_xml
 
@@ -47,8 +48,16 @@ class Reference:
 
 
 @dataclass(frozen=True)
-class MeshReference(Reference):
-    """A mesh reference is a reference to a mesh file, and the scale of the mesh along x, y and z."""
+class FileReference(Reference):
+    """A file reference is a reference to a file; ``source`` is the file that has it, at a place."""
+
+    source: Path
+    place: Place
+
+
+@dataclass(frozen=True)
+class MeshReference(FileReference):
+    """A mesh reference is one to a mesh file, and the scale of the mesh along x, y and z."""
 
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
@@ -64,6 +73,9 @@ class Element:
     names: set[tuple[str, str]] = field(default_factory=set)
     """The names that its children have: the child's element, and its name."""
     text: str = ""
+    start: int = 0
+    """The byte at which its start tag begins, and below that of its end tag."""
+    end_tag: int = 0
     interrupted: bool = False
     """Whether something else interrupts the element's text. Drake reads the text only up to there."""
 
@@ -72,8 +84,11 @@ class ModelFile:
     """Reads and checks one model file; each format has a subclass.
 
     Attributes:
+        sources: the content of the file, and of those that are part of it, by their paths.
         includes: model files that this one includes.
         meshes: files of collision geometry.
+        drawn: files of what is only drawn, which Drake looks for.
+        left_out: the elements that Drake need not read: the name of each, its file and its place.
         mesh_directories: directories of the meshes, relative to the model.
         collisions: the collision geometries of this file, each by its name or else its shape.
 
@@ -86,17 +101,21 @@ class ModelFile:
     UNREAD: ClassVar[frozenset[str]] = frozenset()
     """Drake does not look into these elements."""
 
-    def __init__(self, path: Path, name: str) -> None:
+    def __init__(self, path: Path, name: str, data: bytes) -> None:
         self.name = name
-        self.includes: list[Reference] = []
+        self.sources = {path: data}
+        self.includes: list[FileReference] = []
         self.meshes: list[MeshReference] = []
+        self.drawn: list[FileReference] = []
+        self.left_out: list[tuple[str, Path, Place]] = []
         self.mesh_directories = ["."]
         self.collisions: list[Reference] = []
         self._open: list[Element] = []
-        self._read(path)
+        self._path, self._data = path, data
+        self._read()
 
-    def _read(self, path: Path) -> None:
-        parse_xml(path, self.name, "scene_model", self._install)
+    def _read(self) -> None:
+        parse_xml(self._data, self.name, "scene_model", self._install)
 
     def _begin(self, element: Element, parent: str) -> None:
         """Checks an element where it begins, before anything in it."""
@@ -104,6 +123,19 @@ class ModelFile:
     def _check(self, element: Element, parent: str) -> None:
         """Checks an element where it ends."""
         raise NotImplementedError
+
+    def _skip(self, element: Element) -> None:
+        """Takes what Drake reads of an element in which nobody looks for bodies, where it ends."""
+
+    def _in_attribute(self, element: Element, key: str) -> FileReference:
+        return FileReference(element.attributes[key], element.line, self._path, value_at(self._data, element.start, key))
+
+    def _in_text(self, element: Element) -> FileReference:
+        place = text_at(self._data, element.start, element.end_tag)
+        return FileReference(element.text.strip(), element.line, self._path, place)
+
+    def _leave_out(self, element: Element) -> None:
+        self.left_out.append((element.name, self._path, element_at(self._data, element.start, element.end_tag)))
 
     def refuse(self, element: Element, what: str, hint: str = "mend the model there", code: str = "scene_model") -> NoReturn:
         raise SceneError(code, f"{self.name}:{element.line}: {what}", field="directives", hint=hint)
@@ -131,7 +163,7 @@ class ModelFile:
 
     def _install(self, parser: expat.XMLParserType) -> None:
         def start(name: str, attributes: dict[str, str]) -> None:
-            element = Element(name, parser.CurrentLineNumber, attributes, frozenset())
+            element = Element(name, parser.CurrentLineNumber, attributes, frozenset(), start=parser.CurrentByteIndex)
             if self._open:
                 parent = self._open[-1]
                 element.around = parent.around | {parent.name}
@@ -144,7 +176,10 @@ class ModelFile:
 
         def end(_: str) -> None:
             element = self._open.pop()
-            if not element.around & self.UNREAD:
+            element.end_tag = parser.CurrentByteIndex
+            if element.around & self.UNREAD:
+                self._skip(element)
+            else:
                 self._check(element, self._open[-1].name if self._open else "")
 
         def text(data: str) -> None:

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from certifier.errors import close_matches
 from certifier.scene.formats import sdf_names
-from certifier.scene.formats.model_file import Element, MeshReference, ModelFile, Reference
+from certifier.scene.formats.model_file import Element, FileReference, MeshReference, ModelFile, Reference
 from certifier.scene.formats.ranges import POSITION, SCALE, SIZE
 
 
@@ -47,12 +47,12 @@ class Sdf(ModelFile):
     ONCE = frozenset().union(*sdf_names.ONCE.values()).difference(*sdf_names.MANY.values())
     UNREAD = frozenset().union(*sdf_names.HARMLESS.values()) - sdf_names.READ
 
-    def __init__(self, path: Path, name: str) -> None:
+    def __init__(self, path: Path, name: str, data: bytes) -> None:
         self._limits: dict[str, float] = {}
-        self._uri = Reference("", 0)
+        self._uri: FileReference | None = None
         self._scale = 1.0, 1.0, 1.0
         """The file and the scale of the mesh that is being read."""
-        super().__init__(path, name)
+        super().__init__(path, name, data)
 
     def _begin(self, element: Element, parent: str) -> None:
         if sdf_names.local(element.name) in sdf_names.MEANT and not element.around & self.UNREAD:
@@ -84,14 +84,16 @@ class Sdf(ModelFile):
         elif element.name == "limit":
             self._check_order(element, self._limits.pop("lower", -math.inf), self._limits.pop("upper", math.inf))
         elif element.name == "uri" and parent == "include":
-            self.includes.append(Reference(self._whole(element), element.line))
+            self._whole(element)
+            self.includes.append(self._in_text(element))
         elif element.name == "uri" and parent == "mesh":
-            self._uri = Reference(self._whole(element), element.line)
+            self._whole(element)
+            self._uri = self._in_text(element)
         elif element.name == "mesh" and parent == "geometry":
-            if "uri" not in element.children:
+            if self._uri is None:
                 self.refuse(element, "<mesh> has no <uri>")
-            self.meshes.append(MeshReference(self._uri.file, self._uri.line, self._scale))
-            self._scale = 1.0, 1.0, 1.0
+            self.meshes.append(MeshReference(**vars(self._uri), scale=self._scale))
+            self._uri, self._scale = None, (1.0, 1.0, 1.0)
         elif element.name in self._DIMENSIONS and parent == "geometry":
             for missing in self._DIMENSIONS[element.name].keys() - element.children:
                 self.refuse(element, f"<{element.name}> has no <{missing}>, and Drake would make one up")
@@ -101,6 +103,10 @@ class Sdf(ModelFile):
             self._check_switch(element, f"<{element.name}>", self._whole(element))
         else:
             self._check_structure(element)
+
+    def _skip(self, element: Element) -> None:
+        if element.name in sdf_names.FILES and "visual" in element.around:
+            self.drawn.append(self._in_text(element))
 
     def _check_name(self, element: Element, parent: str) -> None:
         """Refuses an element, or an attribute of it, that is not known where it stands. What an unknown parent has, is left to that."""

@@ -118,6 +118,9 @@ WITH_POSE_FRAMES = VERSIONS[:3]
 """In these versions a pose has a frame; in later ones it has relative_to."""
 
 
+FILES = frozenset(["uri", "drake:diffuse_map"])
+"""The text of these is a file, which Drake looks for also in what is only drawn."""
+
 READ = frozenset(["sdf"]).union(*ONCE.values(), *MANY.values())
 """The elements that are read somewhere."""
 

@@ -92,7 +92,7 @@ class Srdf:
         self._open: list[str] = []
         self._state: dict[str, float] = {}
         self._begun: tuple[dict[str, str], int] = ({}, 0)
-        parse_xml(path, name, "scene_srdf", self._install)
+        parse_xml(path.read_bytes(), name, "scene_srdf", self._install)
         self._finish()
 
     def _install(self, parser: expat.XMLParserType) -> None:

@@ -13,6 +13,7 @@ from certifier.scene.formats.urdf_names import (
     DRAKE,
     EXPAND,
     HARMLESS,
+    LEFT_OUT,
     MAY_HOLD,
     MOVING,
     NAMES,
@@ -20,6 +21,7 @@ from certifier.scene.formats.urdf_names import (
     READ,
     REFUSED,
     TYPES,
+    UNREAD_FILES,
     UNREAD_GROUP,
     UNSUPPORTED,
     Known,
@@ -55,7 +57,7 @@ class Urdf(ModelFile):
         "scale": SCALE,
     }
 
-    def __init__(self, path: Path, name: str) -> None:
+    def __init__(self, path: Path, name: str, data: bytes) -> None:
         self.unlimited: list[Reference] = []
         self._opaque = set(OPAQUE)
         """Elements that are not looked into."""
@@ -67,9 +69,12 @@ class Urdf(ModelFile):
         """What names a link or a joint: the element, ``link`` or ``joint``, and the name."""
         self._held: dict[str, Element] = {}
         """The joints by their children."""
+        self._materials: list[tuple[Element, tuple[str, ...]]] = []
+        """What is drawn in a colour or texture, and which."""
+        self._colour: tuple[str, ...] = ()
         self._parts: dict[str, Element] = {}
         """The elements of the joint or the collision that is being read."""
-        super().__init__(path, name)
+        super().__init__(path, name, data)
 
     def _begin(self, element: Element, parent: str) -> None:
         if is_macro(parent, element.name):
@@ -77,6 +82,8 @@ class Urdf(ModelFile):
         for key, value in element.attributes.items():
             if ("${" in value or "$(" in value) and "gazebo" not in element.around:
                 self.refuse(element, f"{key} of <{element.name}> is {value[:80]!a}, which was not expanded", hint=EXPAND)
+        if element.name == "texture" or (element.name == "mesh" and _VISUAL in element.around):
+            self._draw(element)
         self._prefixes += [key.removeprefix("xmlns:") for key, uri in element.attributes.items() if uri == DRAKE]
         if element.around & self._opaque:
             if element.name in NAMES and not any(element.name in MAY_HOLD.get(place, ()) for place in element.around):
@@ -96,6 +103,10 @@ class Urdf(ModelFile):
             self.refuse(element, f"<{element.name}> is not known {where}", hint=nearest_element(parent, element.name))
         if element.name in ("joint", "collision"):
             self._parts = {}
+
+    def _draw(self, element: Element) -> None:
+        if "filename" in element.attributes and not element.around & UNREAD_FILES:
+            self.drawn.append(self._in_attribute(element, "filename"))
 
     def _check_attributes(self, element: Element, known: Known) -> None:
         for key in element.attributes:
@@ -117,6 +128,13 @@ class Urdf(ModelFile):
                 self.refuse(element, f"<{element.name}> has no {key}")
 
     def _check(self, element: Element, parent: str) -> None:
+        if element.name in LEFT_OUT.get(parent, ()) and not element.around & self._opaque:
+            self._leave_out(element)
+        if element.name == "material" and element.around <= {"robot", "link", _VISUAL}:
+            self._materials.append((element, self._colour))
+            self._colour = ()
+        if element.name == "robot" and not parent:
+            self._check_materials()
         drawn = _VISUAL in element.around
         known = READ.get(("collision" if parent == _VISUAL else parent, element.name))
         if known is None or (element.around & self._opaque and not drawn):
@@ -130,6 +148,20 @@ class Urdf(ModelFile):
         if not drawn:
             self._parts[element.name] = element
             self._check_read(element, parent, known)
+
+    def _skip(self, element: Element) -> None:
+        if "material" in element.around:
+            self._colour += tuple(word for key in ("rgba", "filename") for word in element.attributes.get(key, "").split())
+
+    def _check_materials(self) -> None:
+        """Leaves out all materials where Drake would stop at one that is not defined, or is defined twice in different ways."""
+        known: dict[str, tuple[str, ...]] = {}
+        for material, colour in sorted(self._materials, key=lambda found: len(found[0].around)):
+            name = material.attributes.get("name", "")
+            if known.setdefault(name, colour) != (colour or known[name]) or not known[name]:
+                for found, _ in self._materials:
+                    self._leave_out(found)
+                return
 
     def _check_numbers(self, element: Element, known: Known) -> None:
         for key in (key for key in known.attributes if key in self._COUNTS and key in element.attributes):
@@ -157,7 +189,7 @@ class Urdf(ModelFile):
                 self.refuse(element, "<geometry> has no shape", hint=f"shapes: {', '.join(sorted(SHAPES & {name for _, name in READ}))}")
             case "mesh":
                 x, y, z = (list(map(float, element.attributes.get("scale", "1").split())) * 3)[:3]
-                self.meshes.append(MeshReference(element.attributes["filename"], element.line, (x, y, z)))
+                self.meshes.append(MeshReference(**vars(self._in_attribute(element, "filename")), scale=(x, y, z)))
             case "collision":
                 if element.attributes.get("name") == "":
                     self.refuse(element, "the name of <collision> is empty", hint="give it a name of its own, or leave name out")
@@ -186,6 +218,8 @@ class Urdf(ModelFile):
         name, limit, axis = child.attributes["link"], self._parts.get("limit"), self._parts.get("axis")
         if (first := self._held.setdefault(name, joint)) is not joint:
             self.refuse(child, f"link {name!a} is the child of another joint too, in line {first.line}", hint="only trees are supported")
+        if kind == "fixed" and "mimic" in self._parts:
+            self._leave_out(self._parts["mimic"])
         if kind in MOVING:
             if axis is not None:
                 self._check_length(axis, "xyz of <axis>", list(map(float, axis.attributes["xyz"].split())))

@@ -80,6 +80,12 @@ HARMLESS: Mapping[str, tuple[str, ...]] = {
 }
 """By the parent's name: elements that are not looked into, because they say nothing about where the robot can be."""
 
+LEFT_OUT: Mapping[str, tuple[str, ...]] = {"robot": ("transmission",), "joint": HARMLESS["joint"]}
+"""By the parent's name: harmless elements that Drake would read. It warns of some of them, or stops."""
+
+UNREAD_FILES = frozenset(["gazebo", "sensor", "mujoco", "webots", "ros2_control"])
+"""In these, Drake looks for no file."""
+
 UNREAD_GROUP = ("robot", "drake:collision_filter_group")
 """With another prefix for Drake's namespace, it is not read, so it hides no pair."""
 
@@ -115,7 +121,7 @@ DRAKE = "http://drake.mit.edu"
 """The namespace of Drake's own names. Drake knows them by the prefix ``drake:`` alone."""
 
 XACRO = "xacro"
-EXPAND = "expand the file with xacro first: xacro FILE > robot.urdf"
+EXPAND = 'expand the file with xacro first, or write xmlns:xacro="http://www.ros.org/wiki/xacro" into <robot>'
 _MACROS = frozenset(["macro", "property", "include", "insert_block", "if", "unless"])
 """Old files use these names without the prefix ``xacro:``."""
 

@@ -156,7 +156,7 @@ def test_a_model_in_the_robot_is_a_part_of_it(tmp_path: Path) -> None:
             <joint name="two" type="revolute"><parent>wrist</parent><child>hand::palm</child>{turns}</joint></model>"""
         )
     )
-    made = draft(tmp_path / "robot.sdf", [], tmp_path / "scene.yaml", {})
+    made = draft(tmp_path / "robot.sdf", [], tmp_path / "scene.yaml", {}, {})
     assert [(pair.a, pair.b) for pair in made.ignored] == [("r/base/c", "r::hand/palm/c")]
     assert made.overlapping == ()
 
@@ -169,7 +169,7 @@ def test_a_mimic_joint_follows_the_joint_of_the_whole_name(tmp_path: Path) -> No
     joints += joint.format("follow", -1, '<mimic joint="lead"><multiplier>1</multiplier><offset>0</offset><reference>0</reference></mimic>')
     text = f'<sdf version="1.11"><model name="arm"><link name="base"/>{joints}</model></sdf>'
     (tmp_path / "arm.sdf").write_text(text)
-    made = draft(tmp_path / "arm.sdf", [], tmp_path / "scene.yaml", {})
+    made = draft(tmp_path / "arm.sdf", [], tmp_path / "scene.yaml", {}, {})
     assert "  arm/lead: 0.25\n" in made.text
     assert "  arm/follow: 0.25\n" in made.text
     assert [joint.name for joint in made.scene.moving] == ["arm/x/lead"]

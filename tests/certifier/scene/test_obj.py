@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pydrake.geometry import Convex
 
 from certifier.errors import SceneError
-from certifier.scene.obj import read_mesh
+from certifier.scene.meshes.read import read_mesh
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 WORDS = ["nan", "inf", "-inf", "infinity", "abc", "1e400"]

@@ -7,7 +7,13 @@ from pathlib import Path
 import pytest
 
 from certifier.errors import SceneError
-from certifier.scene.packages import packages_of
+from certifier.scene import packages
+
+
+def packages_of(model: Path, given: dict[str, Path], environment: dict[str, str]) -> tuple[dict[str, Path], list[str]]:
+    """Looks for the packages of a model without xacro."""
+    return packages.packages_of(model, given, environment, {}, model.parent)
+
 
 MODEL = '<robot name="r"><link name="l"><visual><geometry><mesh filename="package://{0}/m.obj"/></geometry></visual></link></robot>'
 

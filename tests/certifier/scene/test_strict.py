@@ -130,11 +130,11 @@ def test_what_drake_would_read_otherwise_is_refused(tmp_path, change, where, wor
     assert words in caught.value.message
 
 
-@pytest.mark.parametrize("kind", ["stl", "vtk", "gltf", "dae", "glb", "ply"])
+@pytest.mark.parametrize("kind", ["vtk", "gltf", "glb", "ply"])
 @pytest.mark.parametrize("change", [lambda f: {"shape": f'<mesh filename="{f}"/>'}, lambda f: sdf(shape=f"<mesh><uri>{f}</uri></mesh>")])
 def test_a_collision_mesh_of_another_kind_is_refused(tmp_path, kind, change):
     (tmp_path / f"m.{kind}").write_text("")
-    with pytest.raises(SceneError, match=rf":\d: 'm\.{kind}' is collision geometry.*convert it to OBJ"):
+    with pytest.raises(SceneError, match=rf":\d: 'm\.{kind}' is collision geometry.*OBJ, STL and DAE meshes are read.*convert it"):
         parsed(write(tmp_path, **change(f"m.{kind}")))
 
 
@@ -383,5 +383,5 @@ def test_the_draft_of_a_model_that_includes_does_not_depend_on_its_place(tmp_pat
         "<include>", '<link name="l"/>' + TURN.format("").replace("door", "d") + "<include>"
     )
     laid_out(tmp_path, models__first=model, models__part=PART)
-    drafts = [draft(tmp_path / "models" / "first.sdf", [], tmp_path / place / "scene.yaml", {}) for place in ("models", "cell", ".")]
+    drafts = [draft(tmp_path / "models" / "first.sdf", [], tmp_path / place / "scene.yaml", {}, {}) for place in ("models", "cell", ".")]
     assert len({made.scene.hash for made in drafts}) == 1

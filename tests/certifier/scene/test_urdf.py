@@ -44,7 +44,7 @@ PARTS = {
 def read(directory: Path, **parts: str) -> Urdf:
     path = directory / "arm.urdf"
     path.write_text(ROBOT.format(**{**PARTS, **parts}))
-    return Urdf(path, path.name)
+    return Urdf(path, path.name, path.read_bytes())
 
 
 OTHER = '<collision><geometry><box size="1 1 1"/></geometry></collision>'
@@ -170,7 +170,7 @@ def test_what_drake_would_drop_or_refuse_without_a_line_is_refused_with_it(tmp_p
 def test_another_root_is_refused(tmp_path, root):
     (tmp_path / "a.urdf").write_text(f"\n<{root} name='a'><link name='l'/></{root}>")
     with pytest.raises(SceneError, match=rf"a\.urdf:2: <{root}> is not known as the root"):
-        Urdf(tmp_path / "a.urdf", "a.urdf")
+        Urdf(tmp_path / "a.urdf", "a.urdf", (tmp_path / "a.urdf").read_bytes())
 
 
 GAZEBO = (

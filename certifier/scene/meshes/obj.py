@@ -11,15 +11,12 @@ import itertools
 import math
 import re
 from array import array
-from dataclasses import dataclass
-from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from certifier.errors import SceneError
-from certifier.model import Array
+from certifier.scene.meshes.mesh import EXPORT, Mesh
 
 _BOM = b"\xef\xbb\xbf"
 _LENGTH = 1000
@@ -32,20 +29,7 @@ _OTHER = frozenset([b"vt", b"vn", b"g", b"o", b"s", b"l", b"p", b"mtllib", b"use
 """These statements move no point of the surface."""
 
 
-@dataclass(frozen=True)
-class ObjMesh:
-    """A mesh as its file has it.
-
-    Attributes:
-        points: (k, 3) every vertex; those that no face uses are among them.
-        triangles: (t, 3) the numbers of the points of every triangle, from 0. A face of more points is a fan of triangles.
-    """
-
-    points: Array
-    triangles: NDArray[np.int64]
-
-
-def read_mesh(path: Path, name: str) -> ObjMesh:
+def read_obj(data: bytes, name: str) -> Mesh:
     """Returns the mesh of an OBJ file.
 
     Args:
@@ -55,11 +39,11 @@ def read_mesh(path: Path, name: str) -> ObjMesh:
         SceneError: ``scene_model``, with the line, when a vertex is not three finite decimal numbers, a face names a vertex that does not
             exist, or a statement is not known.
     """
-    data = path.read_bytes().removeprefix(_BOM)
+    data = data.removeprefix(_BOM)
     coordinates, triangles = array("d"), array("q")
     farthest, farthest_line = 0, 0
 
-    def refuse(line: int, what: str, hint: str = "export the mesh again") -> NoReturn:
+    def refuse(line: int, what: str, hint: str = EXPORT) -> NoReturn:
         raise SceneError("scene_model", f"{name}:{line}: {what}", field="directives", hint=hint)
 
     if b"\0" in data:
@@ -95,7 +79,7 @@ def read_mesh(path: Path, name: str) -> ObjMesh:
         refuse(1, "the file has no vertices")
     if not triangles:
         refuse(1, "the file has no faces")
-    return ObjMesh(np.array(coordinates).reshape(-1, 3), np.array(triangles, dtype=np.int64).reshape(-1, 3))
+    return Mesh(np.array(coordinates).reshape(-1, 3), np.array(triangles, dtype=np.int64).reshape(-1, 3))
 
 
 def _vertex(line: bytes, words: list[bytes]) -> list[float] | None:

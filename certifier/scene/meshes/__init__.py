@@ -1,0 +1,1 @@
+"""Mesh files are read strictly here, each format by its own reader."""
