@@ -48,7 +48,7 @@ def uniform_in_q(polytope: Polytope, space: ConfigurationSpace, chains: int, eac
 def _walk(polytope: Polytope, space: ConfigurationSpace, s: Array, rounds: int, rng: np.random.Generator) -> Array:
     """Returns the chains s (k, n) after that many rounds over all axes."""
     walked = s.copy()
-    _rounds(np.ascontiguousarray(polytope.C.T), polytope.d, space.revolute, rng.random((len(s), rounds, s.shape[1])), walked)
+    _rounds(np.ascontiguousarray(polytope.C.T), polytope.d, space.revolute, rng.random((rounds, s.shape[1], len(s))), walked)
     return walked
 
 
@@ -58,11 +58,11 @@ def _rounds(columns: Array, d: Array, revolute: np.ndarray, places: Array, s: Ar
 
     Args:
         columns: (n, m) the transpose of C.
-        places: (k, rounds, n).
+        places: (rounds, n, k).
     """
     slack = np.empty(len(d))
     for chain in range(len(s)):
-        for turn in range(places.shape[1]):
+        for turn in range(len(places)):
             # The slack is computed anew in every round, so that rounding does not add up.
             slack[:] = d
             for i in range(len(columns)):
@@ -76,7 +76,7 @@ def _rounds(columns: Array, d: Array, revolute: np.ndarray, places: Array, s: Ar
                         most = min(most, room / column[j])
                     elif column[j] < 0.0:
                         least = max(least, room / column[j])
-                least, most, place = here + least, here + most, places[chain, turn, i]
+                least, most, place = here + least, here + most, places[turn, i, chain]
                 if revolute[i]:
                     begin, end = math.atan(least), math.atan(most)
                     there = math.tan(begin + (end - begin) * place)

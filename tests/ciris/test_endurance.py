@@ -169,8 +169,8 @@ def test_half_a_turn_from_the_centre_has_no_s() -> None:
 
 @pytest.mark.parametrize(
     "q",
-    [[[0.0], [1.0, 2.0]], [1j], [None], ["x"], [np.nan], np.ma.masked_array([1.0], mask=[True]), object()],
-    ids=["ragged", "complex", "none", "text", "nan", "masked", "object"],
+    [[[0.0], [1.0, 2.0]], [1j], [None], [np.nan], np.ma.masked_array([1.0], mask=[True]), object()],
+    ids=["ragged", "complex", "none", "nan", "masked", "object"],
 )
 def test_what_is_no_array_of_numbers_is_refused_before_it_is_sent(q: Any) -> None:
     service = ciris.connect("http://127.0.0.1:9")

@@ -77,7 +77,8 @@ class _Document:
         if len(shown) != 1:
             self._refuse(self._root, f"the file shows {len(shown)} scenes instead of 1")
         scene = self._named(shown[0], "url", "visual_scene")
-        found = list(self._placed(scene, np.eye(4), ()))
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused below
+            found = list(self._placed(scene, np.eye(4), ()))
         count = np.cumsum([0, *(len(points) for points, _ in found)])
         triangles = [numbers + first for (_, numbers), first in zip(found, count, strict=False)]
         if not any(map(len, triangles)):
