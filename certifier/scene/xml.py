@@ -17,8 +17,12 @@ def parse_xml(data: bytes, name: str, code: str, install: Callable[[expat.XMLPar
         install: sets the parser's handlers, before anything is read.
 
     Raises:
-        SceneError: with ``code`` and the line, for XML that is broken or declares a document type; or whatever the handlers raise.
+        SceneError: with ``code``, for XML in UTF-16, and with the line for XML that is broken or declares a document type; or whatever the
+            handlers raise.
     """
+    if b"\0" in data:
+        message = f"{name}: the file is in UTF-16 or UTF-32, which Drake does not read"
+        raise SceneError(code, message, field="directives", hint="save the file as UTF-8")
     parser = expat.ParserCreate()
 
     def refuse(*_: object) -> None:

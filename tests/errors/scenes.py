@@ -134,6 +134,7 @@ SCENES: Table = {
         lambda t: drafted(t, t.write(robot__urdf=FAR)),
         lambda t: t.scene(arm="<!DOCTYPE r [<!ENTITY a 'aaa'>]><robot name='r'/>"),
         lambda t: t.scene(arm="<robot"),
+        lambda t: t.scene(arm="<robot name='r\0'/>"),
     ],
     ("scene_model", ""): [lambda t: drafted(t, t.directory), lambda t: drafted(t, t.directory / "no.urdf")],
     ("scene_package", ""): [

@@ -1,12 +1,14 @@
 """Where Drake reads a copy, the scene is that of the user's file, and messages name the user's file and its line."""
 
 import struct
+from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
 from certifier.errors import SceneError
+from certifier.scene.draft import draft
 from tests.certifier.scene.workshop import parsed, write
 
 TRANSMISSION = '<transmission name="{}"><type>SimpleTransmission</type><joint name="turn"/><actuator name="motor"/></transmission>'
@@ -95,3 +97,11 @@ def test_a_mimic_of_a_fixed_joint_and_materials_stop_nothing(tmp_path):
     materials = '<material name="m"><color rgba="1 0 0 1"/></material><material name="m"><color rgba="0 0 0 1"/></material>'
     fixed = '<link name="tip"/><joint name="t" type="fixed"><parent link="hand"/><child link="tip"/><mimic joint="turn"/></joint>'
     assert parsed(write(tmp_path, more=materials + fixed)).pairs
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-32"])
+def test_a_model_in_another_encoding_is_refused_by_name(tmp_path: Path, encoding: str) -> None:
+    model = tmp_path / "arm.urdf"
+    model.write_bytes(f'<?xml version="1.0" encoding="{encoding}"?><robot name="arm"/>'.encode(encoding))
+    with pytest.raises(SceneError, match=r"arm\.urdf: the file is in UTF-16 or UTF-32"):
+        draft(model, [], tmp_path / "scene.yaml", {})
