@@ -42,8 +42,7 @@ CoarsePairs = dict[tuple[Shape, Shape], tuple[Volume, Volume]]
 def coarse_pairs_of(scene: Scene, polytope: Polytope, points: Array) -> CoarsePairs:
     """Returns the volumes that faces keep apart on a polytope, where they are not geometries of the scene.
 
-    Left out are those without ROOM, and those that Drake has no shape for, which are hulls of balls. There the geometries themselves have
-    to do.
+    Left out are those without ROOM. There the geometries themselves have to do.
 
     Args:
         polytope: joint limits included.
@@ -58,9 +57,8 @@ def coarse_pairs_of(scene: Scene, polytope: Polytope, points: Array) -> CoarsePa
     for bodies in parted(scene, polytope, samples_of(scene, polytope), points):
         if all(volume.is_geometry_of(scene) for volume in bodies.volumes):
             continue
-        has_shape = all(volume.radius == 0 or len(volume.vertices) <= 2 for volume in bodies.volumes)
         room = ROOM * max(volume.radius for volume in bodies.volumes)
-        if has_shape and (bodies.extent * gaps(*bodies.hulls, points) > room).all():
+        if (bodies.extent * gaps(*bodies.hulls, points) > room).all():
             first, second = (Shape(volume.body, volume.vertices.tobytes(), volume.radius) for volume in bodies.volumes)
             found[first, second] = bodies.volumes
     return found
