@@ -2,8 +2,8 @@
 
     s_i = tan((q_i - q*_i) / 2)   of a revolute joint,      s_i = q_i - q*_i   of a prismatic one.
 
-Only these do this arithmetic themselves: compiled kernels (certifier.motion), ball arithmetic (planner.motion.curve), and the verifier,
-which shares no code with what it checks.
+Only these do this arithmetic themselves: compiled kernels (certifier.motion, certifier.polytopes.gibbs, certifier.seeding.contacts), ball
+arithmetic (planner.motion.curve), and the verifier, which shares no code with what it checks.
 """
 
 from __future__ import annotations

@@ -67,7 +67,7 @@ def outer(points: Array, max_vertices: int) -> tuple[Array, float, int]:
         for growth in _GROWTHS:
             vertices = around * (1 + growth)
             if contains(vertices + center, points):
-                distance = max(_nearest(v, extreme - center)[1] for v in vertices)
+                distance = max(nearest_in_hull(v, extreme - center)[1] for v in vertices)
                 inflation = max(distance * (1 + _SAFETY), distance + _ROUNDING * float(np.abs(points).max()))
                 return vertices + center, inflation, len(extreme)
     message = f"no polytope of {max_vertices} vertices was found around a mesh of {len(points)} points"
@@ -131,7 +131,7 @@ def _cut_down(points: Array, max_vertices: int) -> Array:
     for _ in range(max_vertices):
         for v in vertices:
             if v.tobytes() not in distances:
-                distances[v.tobytes()] = _nearest(v, points)
+                distances[v.tobytes()] = nearest_in_hull(v, points)
         worst = max(vertices, key=lambda v: distances[v.tobytes()][1])
         nearest, distance = distances[worst.tobytes()]
         if distance == 0:
@@ -159,7 +159,7 @@ def _contain(vertices: Array, points: Array) -> Array:
     return vertices * max(1.0, excess)
 
 
-def _nearest(x: Array, points: Array) -> tuple[Array, float]:
+def nearest_in_hull(x: Array, points: Array) -> tuple[Array, float]:
     """Returns a point of the hull of points near x, (3,), and its distance from x.
 
     It solves nonnegative least squares with a heavy row for the sum of the weights.

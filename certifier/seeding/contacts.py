@@ -76,10 +76,16 @@ class Contacts:
 
 
 @njit(cache=True)
-def _distance(bodies: Bodies, seen: Seen, pair: int, s: Array, q_star: Array, revolute: np.ndarray, q: Array, R: Array, p: Array) -> float:
-    """Returns how far a pair's padded bodies are apart at s, metres; 0 or less where they touch. ``q``, ``R`` and ``p`` are filled in."""
+def _to_q(s: Array, q_star: Array, revolute: np.ndarray, q: Array) -> None:
+    """Fills in the joint positions q at s."""
     for i in range(len(s)):
         q[i] = q_star[i] + (2.0 * math.atan(s[i]) if revolute[i] else s[i])
+
+
+@njit(cache=True)
+def _distance(bodies: Bodies, seen: Seen, pair: int, s: Array, q_star: Array, revolute: np.ndarray, q: Array, R: Array, p: Array) -> float:
+    """Returns how far a pair's padded bodies are apart at s, metres; 0 or less where they touch. ``q``, ``R`` and ``p`` are filled in."""
+    _to_q(s, q_star, revolute, q)
     return distance_at(bodies, seen, pair, q, R, p)
 
 
@@ -102,8 +108,7 @@ def _nearest(
     q, s, slope = np.empty(n), np.empty(n), np.empty(n)
     R, p = np.empty((links, 3, 3)), np.empty((links, 3))
     for point in points:
-        for i in range(n):
-            q[i] = q_star[i] + (2.0 * math.atan(point[i]) if revolute[i] else point[i])
+        _to_q(point, q_star, revolute, q)
         pair = touching_at(bodies, seen, q, order)
         if pair < 0:
             continue

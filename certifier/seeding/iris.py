@@ -17,13 +17,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import nnls
 
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.ellipsoid import Ellipsoid, inscribed_ellipsoid
 from certifier.polytopes.proved import needed_faces
 from certifier.polytopes.sampling import hit_and_run
+from certifier.scene.hull import nearest_in_hull
 from certifier.seeding.coarse_pairs import coarse_pairs_of, with_coarse_pairs
 from certifier.seeding.contacts import Contacts
 from certifier.seeding.options import SeedOptions
@@ -152,22 +152,11 @@ def _face(contact: Array, center: Array, inverse: Array, points: Array, margin: 
     It is tangent to the ellipsoid. Where that loses a point, it is perpendicular, in the ellipsoid's metric, to the way to the nearest
     point of the hull of those to keep.
     """
-    for beside in (center, _nearest(points, contact, inverse)):
-        row = inverse @ inverse @ (contact - beside)
+    nearest, _ = nearest_in_hull(np.zeros(len(contact)), (points - contact) @ inverse)  # in the ellipsoid's metric, from the contact
+    for way in (inverse @ (contact - center), -nearest):
+        row = inverse @ way
         row /= max(float(np.linalg.norm(row)), 1e-300)
         kept, offset = float((points @ row).max()), float(contact @ row)
         if offset - kept > LEAST_ROOM:
             return row, max(offset - margin, (kept + offset) / 2)
     return None
-
-
-def _nearest(points: Array, contact: Array, inverse: Array) -> Array:
-    """Returns the point of the hull of points (k, n) that is nearest to a contact in the ellipsoid's metric, (n,).
-
-    It solves nonnegative least squares with a heavy row for the sum of the weights.
-    """
-    near = (points - contact) @ inverse
-    heavy = 1e3 * max(1.0, float(np.abs(near).max()))
-    weights, _ = nnls(np.vstack([near.T, np.full(len(points), heavy)]), np.append(np.zeros(len(contact)), heavy))
-    found: Array = weights @ points / weights.sum()
-    return found
