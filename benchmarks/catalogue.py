@@ -16,10 +16,10 @@ from certifier.model import Array, Scene
 from certifier.scene import load_scene
 
 ROOT = Path(__file__).parents[1]
-EXAMPLES = ("planar_2dof", "arm_3dof", "ur3e_bin", "iiwa_shelf", "dual_ur3e", "sphere_arm")
+EXAMPLES = ("planar_2dof", "arm_3dof", "ur3e_bin", "iiwa_shelf", "dual_ur3e", "sphere_arm", "ur3e_gripper", "iiwa_gripper")
 """The examples are in the order of their cost."""
 FILES = {name: ROOT / "examples" / name / "scene.yaml" for name in EXAMPLES} | {
-    name: ROOT / "benchmarks" / "scenes" / name / "scene.yaml" for name in ("rail_arm", "gripper_cell")
+    "rail_arm": ROOT / "benchmarks" / "scenes" / "rail_arm" / "scene.yaml"
 }
 VARIANTS = {
     f"iiwa_{figure}_{furniture or 'shelf'}": (figure, furniture)

@@ -31,7 +31,7 @@ QUERIES, POINTS = 100, 10_000
 SECONDS = 5.0
 """Both planners search for at most this long."""
 FINGER = "gripper/left/finger"
-NARROW = {"gripper_cell": {"shelf": ((0.72, -0.28, 0.06), (0.9, 0.28, 0.86)), "bin": ((0.0, 0.4, 0.0), (0.2, 0.7, 0.12))}}
+NARROW = {"iiwa_gripper": {"shelf": ((0.72, -0.28, 0.06), (0.9, 0.28, 0.86)), "bin": ((0.0, 0.4, 0.0), (0.2, 0.7, 0.12))}}
 """Boxes, least and largest corner in the world in metres, that FINGER has to be in for a task."""
 TASKS = 10
 AGAIN = 200

@@ -6,7 +6,7 @@ from certifier.model import Scene
 from certifier.scene.parse import parse
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
-NAMES = ("planar_2dof", "arm_3dof", "iiwa_shelf", "ur3e_bin", "dual_ur3e", "sphere_arm")
+NAMES = ("planar_2dof", "arm_3dof", "iiwa_shelf", "ur3e_bin", "dual_ur3e", "sphere_arm", "ur3e_gripper", "iiwa_gripper")
 
 ARM = """<robot name="arm">
   <link name="base"><collision name="foot"><geometry><box size="0.2 0.2 0.1"/></geometry></collision></link>
