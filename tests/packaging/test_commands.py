@@ -99,6 +99,18 @@ def test_a_changed_lock_is_installed_into_the_same_environment(copy: Path, tools
     assert (copy / "calls").read_text().count("-m pip") == 2
 
 
+def test_slow_tests_get_their_packages_besides_those_of_the_others(copy: Path, tools: Path) -> None:
+    (copy / ".venv/bin").mkdir(parents=True)
+    fake_python(copy / ".venv/bin", "python", 'echo "$*" >>calls; [ "$*" != --version ] || echo Python 3.12.1')
+    (copy / ".venv/runtime.stamp").write_text(stamp(copy, "runtime"))
+    installed = [f"--require-hashes --requirement requirements/{name}.lock" for name in ("test", "slow")]
+    for _ in range(2):
+        run(["./check", "--slow"], copy, str(tools))
+        calls = (copy / "calls").read_text().splitlines()
+        assert [call.partition("--no-compile ")[2] for call in calls if "--require-hashes" in call] == installed
+        assert calls[-1].startswith("-m pytest -m slow ")
+
+
 def test_an_environment_that_was_moved_is_made_anew(copy: Path, tools: Path) -> None:
     (copy / ".venv/bin").mkdir(parents=True)
     fake_python(copy / ".venv/bin", "python", "exit 0")

@@ -13,7 +13,7 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
-LOCKS = {name: (ROOT / "requirements" / f"{name}.lock").read_text() for name in ("runtime", "test", "docs")}
+LOCKS = {name: (ROOT / "requirements" / f"{name}.lock").read_text() for name in ("runtime", "test", "slow", "docs")}
 BROWSER = (ROOT / "requirements/browser.lock").read_text()
 
 
@@ -57,7 +57,7 @@ def test_every_package_of_the_browser_is_exact_and_hashed() -> None:
         assert re.fullmatch(r"(@[\w-]+/)?[\w-]+@\d+\.\d+\.\d+ sha512-[\w+/]{86}==", package), package
 
 
-@pytest.mark.parametrize(("name", "extra"), [("runtime", "service"), ("test", "test"), ("docs", "docs")])
+@pytest.mark.parametrize(("name", "extra"), [("runtime", "service"), ("test", "test"), ("slow", "slow"), ("docs", "docs")])
 def test_a_lock_satisfies_what_the_project_asks_for(name: str, extra: str) -> None:
     locked = pins(LOCKS[name])
     for requirement in [*direct(extra), *map(Requirement, PROJECT["dependency-groups"]["build"])]:
@@ -71,9 +71,10 @@ def test_the_other_locks_contain_the_runtime_lock(other: str) -> None:
     assert {name: more[name].specifier for name in runtime} == {name: pin.specifier for name, pin in runtime.items()}
 
 
-def test_packages_of_several_locks_have_one_version() -> None:
-    test, docs = pins(LOCKS["test"]), pins(LOCKS["docs"])
-    assert {name: docs[name].specifier for name in docs if name in test} == {name: test[name].specifier for name in test if name in docs}
+@pytest.mark.parametrize("name", ["slow", "docs"])
+def test_packages_of_several_locks_have_one_version(name: str) -> None:
+    test, other = pins(LOCKS["test"]), pins(LOCKS[name])
+    assert {each: other[each].specifier for each in other if each in test} == {each: test[each].specifier for each in test if each in other}
 
 
 def test_what_is_installed_is_what_is_locked() -> None:
