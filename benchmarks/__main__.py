@@ -17,6 +17,7 @@ from benchmarks import (
     cover,
     fleet,
     growth,
+    makers,
     models,
     path,
     plan,
@@ -98,6 +99,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     ),
     "cover": _cover,
     "robots": lambda args, screen: robots.robots(args.robots, args.deadline, screen.line),
+    "arms": lambda args, screen: makers.arms(args.arms, args.deadline, args.motions, screen.line),
     "recertify": lambda args, screen: recertify.changes(args.scenes, args.limit, screen.line),
     "query": lambda args, screen: query.query(args.regions, screen.line),
     "plan": lambda args, screen: plan.motions(args.scene, args.url, args.queries, args.points, screen.line),
@@ -177,6 +179,12 @@ def _parser() -> ArgumentParser:
     shipped.add_argument(
         "--deadline", type=float, default=robots.DEADLINE, metavar="SECONDS", help=f"for each region; default {robots.DEADLINE:g}"
     )
+    held = kinds.add_parser("arms", parents=[as_json], help="take makers' arms with their hands from installed wheels to planned motions")
+    held.add_argument("arms", nargs="*", metavar="ARM", default=list(makers.ARMS), help=f"default: all; {', '.join(makers.ARMS)}")
+    held.add_argument(
+        "--deadline", type=float, default=makers.DEADLINE, metavar="SECONDS", help=f"for each region; default {makers.DEADLINE:g}"
+    )
+    held.add_argument("--motions", type=_count, default=makers.MOTIONS, metavar="N", help=f"how many to plan; default {makers.MOTIONS}")
     asked = kinds.add_parser("query", parents=[as_json], help="measure questions of planners about many regions, beside a plain product")
     asked.add_argument("--regions", type=_count, default=query.REGIONS, metavar="N", help=f"default {query.REGIONS}")
     planned = kinds.add_parser("plan", parents=[as_json], help="find and prove motions by a running service, beside OMPL without proofs")

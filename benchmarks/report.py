@@ -251,6 +251,32 @@ def _robots(document: Document) -> list[str]:
     return [f"{document['deadline']:g} s for each region, on all cores.", _table(header, rows)]
 
 
+def _arms(document: Document) -> list[str]:
+    """Returns a table with one line for each arm, and a sentence for each step that failed."""
+    rows, said = [], []
+    for row in document["rows"]:
+        scene, planned = (row[step] if step in row and step not in row["failed"] else None for step in ("load", "plan"))
+        times = {step: f"{row[step]['seconds']:.1f}" if step in row else "" for step in ("draft", "load", "grow", "verify")}
+        cells = [row["arm"], *([str(scene[key]) for key in ("joints", "pairs", "ignored")] if scene else [""] * 3)]
+        cells += [times["draft"], times["load"], *_regions(row.get("grow", {})), times["grow"], times["verify"]]
+        cells += [f"{planned[key]:.2f}" for key in ("p50_seconds", "worst_seconds")] if planned else ["", ""]
+        cells += [f"{planned[key]} of {planned['asked']}" for key in ("answered", "proved")] if planned else ["", ""]
+        rows.append([*cells, ", ".join(row["failed"])])
+        said += [f"{row['arm']}, {step}: {reason}" for step, reason in row["failed"].items()]
+    header = ["arm", "joints", "pairs", "ignored", "draft, s", "load, s", "proposal, s", "first region", "share", "proof, MB", "grow, s"]
+    header += ["verify, s", "plan p50, s", "worst", "answered", "proved", "failed"]
+    return [f"{document['deadline']:g} s for each region, on all cores.", _table(header, rows), *said]
+
+
+def _regions(grown: Document) -> list[str]:
+    """Returns when there was a proposal, the share and the time of the first certified region, and share and megabytes of the last."""
+    proposed = f"{grown['proposal_seconds']:.1f}" if "proposal_seconds" in grown else ""
+    if "curve" not in grown:
+        return [proposed, "", "", ""]
+    first = grown["curve"][0]
+    return [proposed, f"{first['share']:.3f} after {first['seconds']:.0f} s", f"{grown['share']:.3f}", f"{grown['proof_bytes'] / 1e6:.1f}"]
+
+
 def _survey(document: Document) -> list[str]:
     rows = [
         [row["scene"], row["region"], _counts(row["outcomes"]), str(row["left_out"]), seconds(row["seconds"])] for row in document["counts"]
@@ -380,6 +406,7 @@ _TABLES: dict[str, Callable[[Document], list[str]]] = {
     "agreement": _agreement,
     "scaling": _scaling,
     "robots": _robots,
+    "arms": _arms,
     "service": _service,
     "fleet": _fleet,
     "store": _store,

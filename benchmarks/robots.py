@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks import measure, models
+from benchmarks import commands, measure, models
 from benchmarks.measure import Progress
 from certifier.errors import CirisError
 
-CIRIS = [sys.executable, "-P", "-m", "client.cli"]
 DEADLINE = 300.0
 """Seconds that a region may take."""
 
@@ -59,11 +56,9 @@ def _timed(row: dict[str, Any], *arguments: str) -> str:
     """Runs a command of ciris and returns what it prints.
 
     Raises:
-        CirisError: ``command_failed``, with the last line on standard error.
+        CirisError: ``command_failed``.
     """
     verb, start = " ".join(arguments[: 2 if arguments[0] == "scene" else 1]), time.perf_counter()
-    done = subprocess.run([*CIRIS, *arguments], capture_output=True, text=True, check=False)
+    done = commands.run(*arguments)
     row["seconds"][verb] = round(time.perf_counter() - start, 1)
-    if done.returncode != 0:
-        raise CirisError("command_failed", (done.stderr.strip().splitlines() or ["no word"])[-1])
-    return done.stdout
+    return commands.output(done)

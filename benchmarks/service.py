@@ -11,7 +11,6 @@ import os
 import signal
 import statistics
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -22,10 +21,10 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import catalogue, measure
+from benchmarks.commands import CIRIS
 from benchmarks.measure import Progress
 from certifier.errors import CirisError
 
-CIRIS = [sys.executable, "-P", "-m", "client.cli"]
 SQLITE, POSTGRESQL, LOCAL = "SQLite", "PostgreSQL", "--local"
 """The ways: the service with either database, and no service."""
 
