@@ -19,6 +19,8 @@ T = TypeVar("T")
 
 WINDOW = np.radians(170.0)
 """A window reaches at most so far to either side of q*. Nearer to half a turn, s changes so fast that certificates become hard."""
+FAR = np.radians(179.0)
+"""A joint whose limits reach so far from q* gets a window. Files say 3.14 for half a turn, where s is 1256, and 3.14159265: 6e8."""
 EXACT = 1e-9
 """Positions at which coupled joints are held fit to each other this well, in radians or metres."""
 
@@ -83,7 +85,7 @@ def narrowed(joints: Sequence[Joint], limits: Mapping[str, tuple[float, float]])
 
 
 def centered(joints: Sequence[Joint], q_star: Sequence[float] | None) -> tuple[list[Joint], Array]:
-    """Returns the joints, with windows for those that turn farther than s stands for, and q*, (n,).
+    """Returns the joints, with windows for those that turn as far as s stands for, or nearly, and q*, (n,).
 
     Args:
         q_star: as in the scene file; None for the middle of the joint limits, or 0 where a joint has none.
@@ -118,7 +120,7 @@ def _middle(joint: Joint) -> float:
 
 
 def _windowed(joint: Joint, center: float) -> Joint:
-    """Returns a joint with a window where its limits reach half a turn from the centre."""
+    """Returns a joint with a window where its limits reach half a turn from the centre, or nearly."""
     lower, upper = _range(joint)
     if lower >= upper:
         message = f"joint {joint.name} cannot move: its limits are {lower:g} and {upper:g}"
@@ -128,7 +130,7 @@ def _windowed(joint: Joint, center: float) -> Joint:
             message = f"joint {joint.name} has no finite limits"
             raise SceneError("joint_range", message, field="directives", hint=f"give it some by limits: {{{joint.name}: [LOWER, UPPER]}}")
         return joint
-    if center - np.pi < lower and upper < center + np.pi:
+    if center - FAR < lower and upper < center + FAR:
         return joint
     window = max(lower, center - WINDOW), min(upper, center + WINDOW)
     if window[0] >= window[1]:

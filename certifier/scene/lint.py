@@ -74,7 +74,7 @@ def _hollow(scene: Scene) -> list[str]:
 def _windows(scene: Scene) -> list[str]:
     """Returns a finding about every joint of which the scene covers a window."""
     return [
-        f"joint {j.name} may turn half a turn from q* and farther: the scene covers {lower:.6g} to {upper:.6g} degrees"
+        f"joint {j.name} may turn 179 degrees from q* and farther: the scene covers {lower:.6g} to {upper:.6g} degrees"
         for j, lower, upper in zip(scene.moving, np.degrees(scene.q_lower), np.degrees(scene.q_upper), strict=True)
         if j.own_limits is not None
     ]

@@ -40,12 +40,18 @@ def model_pose(directory, q, body):
     return plant.GetBodyByName(body, model).body_frame().CalcPose(context, base.body_frame()).GetAsMatrix4()
 
 
+def within(angle: str) -> str:
+    return f'<limit lower="-{angle}" upper="{angle}" effort="1" velocity="1"/>'
+
+
 @pytest.mark.parametrize(
     ("change", "extra", "own", "window"),
     [
         ({"limit": WIDE}, "", (-2 * np.pi, 2 * np.pi), (-170, 170)),
         ({"limit": WIDE}, "q_star: [1]\n", (-2 * np.pi, 2 * np.pi), (1 - np.radians(170), 1 + np.radians(170))),
         ({"kind": "continuous", "limit": ""}, "", (None, None), (-170, 170)),
+        ({"limit": within("3.14159265")}, "", (-3.14159265, 3.14159265), (-170, 170)),
+        ({"limit": within("3.14")}, "", (-3.14, 3.14), (-170, 170)),
         ({}, "q_star: [-2]\n", (-1, 2), (-1, -2 + np.radians(170))),
     ],
 )
@@ -56,13 +62,18 @@ def test_a_joint_that_turns_far_has_a_window_about_q_star(tmp_path, change, extr
     assert turn.own_limits == own
     assert (turn.lower, turn.upper) == pytest.approx((lower, upper))
     assert turn.lower < scene.q_star[0] + np.pi
-    assert any(w.startswith("joint arm/turn may turn half a turn from q*") for w in scene.warnings)
+    assert any(w.startswith("joint arm/turn may turn 179 degrees from q*") for w in scene.warnings)
     outside = any(w == "q_star of joint arm/turn is -2, which is not within its limits, -1 to 2" for w in scene.warnings)
     assert outside is (extra == "q_star: [-2]\n")
     again = Scene.from_document(scene.to_document())
     assert again.moving[0].own_limits == own
     assert again.hash == scene.hash
     check_scene(scene)
+
+
+def test_a_joint_that_stays_away_from_half_a_turn_has_its_own_limits(tmp_path):
+    scene = parsed(write(tmp_path, limit=within("3.12")))
+    assert (scene.moving[0].lower, scene.moving[0].upper, scene.moving[0].own_limits) == (-3.12, 3.12, None)
 
 
 def test_a_scene_without_windows_has_the_hash_that_it_always_had(tmp_path):
