@@ -96,8 +96,8 @@ def begin_stage(scene: Scene, state: GrowthState, reach: float, polytope: Polyto
     """Asks to certify all pairs on a polytope; what was proved in the stage before does not carry over to it."""
     box = ProvedBox.of_program(scene, polytope)
     stage = 1 if state.whole is None else state.whole.stage + 1
-    joined = _together(scene, state)
-    begun = Whole(reach, kept, polytope, **vars(box), since=passed, passed=passed, stage=stage, together=joined)
+    grouped = _together(scene, state, polytope)
+    begun = Whole(reach, kept, polytope, **vars(box), since=passed, passed=passed, stage=stage, together=grouped)
     return _next(scene, replace(state, whole=begun))
 
 
@@ -228,13 +228,11 @@ def _ended(state: GrowthState, report: Outcomes, reason: str) -> Transition:
     return Transition(state, Finish(combine(list(report.outcomes.values())), reason))
 
 
-def _together(scene: Scene, state: GrowthState) -> Together:
-    """Returns which pairs are grouped to share one certificate: the same in all stages; none where a region is certified again."""
-    if state.whole is not None:
-        return state.whole.together
+def _together(scene: Scene, state: GrowthState, polytope: Polytope) -> Together:
+    """Returns which pairs are grouped to share one certificate on a stage's polytope; none where a region is certified again."""
     if state.start is None or state.start.again:
         return {}
-    return together(scene, samples_of(scene, state.start.rows)[::THIN], state.start.keep)
+    return together(scene, samples_of(scene, polytope)[::THIN], state.start.keep)
 
 
 def _next(scene: Scene, state: GrowthState) -> Transition:

@@ -1,12 +1,13 @@
-"""Pairs of the same two bodies are grouped here to share one certificate, where the hulls of their geometries suffice.
+"""Pairs of the same two rigid parts are grouped here to share one certificate, where one volume for all of a part's geometries suffices.
 
-A link is often modelled by many balls. A plane that separates the hull of a link's balls from a board separates each of them, and one
-partition takes about as long as that of one ball. A hull may touch what none of its balls does, so hulls are taken only where they
-lose next to nothing of the proposal.
+A rigid part is a link with all that is welded to it: a hand with its palm, fingers and camera, or a link that is modelled by many balls.
+A plane that separates a volume around them from a board separates each of them, and one partition takes about as long as that of one
+geometry. The volume may touch what none of the geometries does, so it is taken only where it loses next to nothing of the polytope.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,9 +18,13 @@ from certifier.partition.hulls import gaps, hull
 from certifier.proof import limits
 
 THIN = 8
-"""One in this many samples of a proposal is enough to say which pairs share one certificate."""
+"""One in this many samples of a polytope is enough to say which pairs share one certificate."""
 LOST = 0.002
-"""Two hulls touch at no more than this share of the samples. Samples at which two of the geometries themselves touch do not count."""
+"""Two volumes touch at no more than this share of the samples. Samples at which two of the geometries themselves touch do not count."""
+ROOM = 0.5
+"""At the points to keep, two volumes keep at least this part of the distance of the geometries."""
+MARGIN = 1e-9
+"""A volume is larger than what it has to contain by this, in metres, because welds are rounded."""
 
 Together = dict[int, tuple[int, ...]]
 """Pair index -> the other pairs, by their indices, that share its certificate."""
@@ -29,48 +34,63 @@ def together(scene: Scene, samples: Array, keep: Array) -> Together:
     """Returns which pairs share one certificate.
 
     Args:
-        samples: (S, n) configurations of the proposal.
-        keep: (k, n) configurations at which hulls must not touch.
+        samples: (S, n) configurations of the polytope, uniform in q.
+        keep: (k, n) configurations at which volumes keep ROOM.
     """
+    kinematics = Kinematics.of(scene)
     numbers = {frozenset((pair.a, pair.b)): index for index, pair in enumerate(scene.pairs)}
     clusters = _clusters(scene)
     found: Together = {}
     for i, first in enumerate(clusters):
         for second in clusters[:i]:
-            if first[0].body != second[0].body:
+            if kinematics.rigid_root(first[0].body) != kinematics.rigid_root(second[0].body):
                 for members in _joined(scene, first, second, numbers, samples, keep):
                     found[members[0]] = tuple(members[1:])
     return found
 
 
 def volumes_of(scene: Scene, pairs: Sequence[Pair]) -> tuple[Volume, Volume]:
-    """Returns the two hulls of the geometries of pairs between the same two bodies; one pair has the geometries themselves."""
-    body = scene.geometry(pairs[0].a).body
-    names = sorted({name for pair in pairs for name in (pair.a, pair.b)})
-    geometries = [scene.geometry(name) for name in names]
-    return _hull([g for g in geometries if g.body == body]), _hull([g for g in geometries if g.body != body])
+    """Returns the two volumes around the geometries of pairs between the same two rigid parts; one pair has the geometries themselves."""
+    kinematics, geometries = (
+        Kinematics.of(scene),
+        [scene.geometry(name) for name in sorted({n for pair in pairs for n in (pair.a, pair.b)})],
+    )
+    root = kinematics.rigid_root(scene.geometry(pairs[0].a).body)
+    first, second = ([g for g in geometries if (kinematics.rigid_root(g.body) == root) == here] for here in (True, False))
+    return _volume(kinematics, first), _volume(kinematics, second)
 
 
-def _hull(geometries: Sequence[Geometry]) -> Volume:
-    """Returns the hull of geometries of one body that have the same radius."""
-    vertices = np.concatenate([geometry.vertices for geometry in geometries])
-    return Volume(tuple(geometry.name for geometry in geometries), geometries[0].body, vertices, geometries[0].radius)
+def _volume(kinematics: Kinematics, geometries: Sequence[Geometry]) -> Volume:
+    """Returns the hull of geometries that are welded to each other and have the same radius, or a box around it if that has fewer vertices.
+
+    The box is the smallest one of those along the axes of the geometries' bodies.
+    """
+    if len(geometries) == 1:
+        return Volume.of(geometries[0])
+    radius, names, bodies = geometries[0].radius, tuple(g.name for g in geometries), dict.fromkeys(g.body for g in geometries)
+    here = np.zeros((1, kinematics.scene.n))
+    placed = {body: np.concatenate([kinematics.points(body, g.body, g.vertices, here)[0] for g in geometries]) for body in bodies}
+    if len(placed[geometries[0].body]) <= limits.CORNERS:
+        return Volume(names, geometries[0].body, placed[geometries[0].body], radius if len(bodies) == 1 else radius + MARGIN)
+    body = min(bodies, key=lambda body: float(np.ptp(placed[body], axis=0).prod()))
+    ends = placed[body].min(axis=0) - MARGIN, placed[body].max(axis=0) + MARGIN
+    return Volume(names, body, np.array(list(itertools.product(*zip(*ends, strict=True)))), radius)
 
 
 def _clusters(scene: Scene) -> list[list[Geometry]]:
-    """Returns the geometries that pairs are about, those of one link with the same radius together, each obstacle by itself."""
+    """Returns the geometries that pairs are about, those of one rigid part with the same radius together, each obstacle by itself."""
     kinematics, found = Kinematics.of(scene), dict[tuple[str, float, str], list[Geometry]]()
     for name in dict.fromkeys(name for pair in scene.pairs for name in (pair.a, pair.b)):
         geometry = scene.geometry(name)
-        moves = kinematics.rigid_root(geometry.body) != WORLD
-        found.setdefault((geometry.body, geometry.radius, "" if moves else name), []).append(geometry)
+        root = kinematics.rigid_root(geometry.body)
+        found.setdefault((root, geometry.radius, name if root == WORLD else ""), []).append(geometry)
     return list(found.values())
 
 
 def _joined(
     scene: Scene, first: list[Geometry], second: list[Geometry], numbers: dict[frozenset[str], int], samples: Array, keep: Array
 ) -> list[list[int]]:
-    """Returns the pairs, by their indices, of each two hulls of geometries of either list that suffice; other pairs stay alone."""
+    """Returns the pairs, by their indices, of each two volumes around geometries of either list that suffice; other pairs stay alone."""
     if len(first) * len(second) == 1:
         return []
     asked = [numbers.get(frozenset((a.name, b.name))) for a in first for b in second]
@@ -92,15 +112,17 @@ def _halves(geometries: list[Geometry]) -> tuple[list[Geometry], list[Geometry]]
 
 
 def _will_do(scene: Scene, first: list[Geometry], second: list[Geometry], samples: Array, keep: Array) -> bool:
-    """Returns whether two hulls have few vertices and keep the distance that they have to keep."""
-    one, other = _hull(first), _hull(second)
-    if max(len(one.vertices), len(other.vertices)) > limits.CORNERS or (_gaps(scene, one, other, keep) <= 0).any():
+    """Returns whether two volumes keep the distance that they have to keep."""
+    kinematics = Kinematics.of(scene)
+    one, other = _volume(kinematics, first), _volume(kinematics, second)
+    own = [(Volume.of(a), Volume.of(b)) for a in first for b in second]
+    room = np.min([_gaps(scene, a, b, keep) for a, b in own], axis=0)
+    if (_gaps(scene, one, other, keep) <= ROOM * room).any():
         return False
     touching = samples[_gaps(scene, one, other, samples) <= 0]
     excused = np.zeros(len(touching), dtype=bool)
-    for a in first if len(touching) else []:
-        for b in second:
-            excused |= _gaps(scene, Volume.of(a), Volume.of(b), touching) <= 0
+    for a, b in own if len(touching) else []:
+        excused |= _gaps(scene, a, b, touching) <= 0
     return bool((~excused).sum() <= LOST * len(samples))
 
 

@@ -61,6 +61,26 @@ def beads(count=4, spacing=0.25, radius=0.08, obstacle=None, lean=(0.0, 0.0)):
     return replace(arm, geometries=(*balls, obstacle), pairs=pairs)
 
 
+def hand(obstacle=None, seed=0):
+    """A planar arm of two links with a hand: a palm, a camera and two fingers, bodies that are welded to the last link at odd angles.
+
+    Pairs are those of the hand's four boxes with the obstacle.
+    """
+    obstacle = obstacle or box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.9, 0.0))
+    arm, rng = planar_arm(2, obstacle), np.random.default_rng(seed)
+    joints, geometries, parent = [*arm.joints], [], "arm/link2"
+    places = {"palm": (1.0, 0.0, 0.0), "camera": (0.05, 0.0, 0.1), "left": (0.1, 0.1, 0.0), "right": (0.1, -0.1, 0.0)}
+    for name, place in places.items():
+        body = f"hand/{name}"
+        fixed = pose(place, rng.normal(size=3), rng.uniform(-0.5, 0.5))
+        joints.append(Joint(f"weld {name}", JointKind.WELD, parent, body, np.zeros(3), fixed, np.eye(4), None, 0.0, 0.0))
+        geometries.append(box(f"{body}/box", body, (0.1, 0.05, 0.04), (0.02, 0.0, 0.0)))
+        parent = "hand/palm"
+    pairs = tuple(Pair(one.name, obstacle.name) for one in geometries)
+    bodies = (*arm.bodies, *(geometry.body for geometry in geometries))
+    return replace(arm, joints=tuple(joints), bodies=bodies, geometries=(*geometries, obstacle), pairs=pairs)
+
+
 def two_arms(links=3, apart=7.0, limit=2.0):
     """Two arms of links of length 1 in the xy-plane that reach for each other from ``apart`` metres; pairs left bar - right bar."""
     joints, bodies, geometries = [], [WORLD], []

@@ -1,4 +1,4 @@
-"""Pairs that are certified as one: which they are, that their hulls hold them, and that their proofs say so of each of them."""
+"""Pairs that share one certificate: which they are, that volumes contain their geometries, and that proofs say so of each of them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from certifier.errors import ProofError
 from certifier.growth.options import GrowthOptions
 from certifier.jobs.local import grow, recertify
 from certifier.kinematics import Kinematics
@@ -21,7 +22,7 @@ from certifier.proof.region import read_part
 from certifier.verify.kinematics import ExactKinematics
 from certifier.verify.region import verify_region
 from certifier.verify.volume import check_volume
-from tests.certifier.scenes import beads, box
+from tests.certifier.scenes import beads, box, hand
 from tests.scenes import box_seed
 
 
@@ -155,3 +156,48 @@ def test_a_region_of_such_pairs_is_certified_again_for_a_changed_scene():
     statement = verify_region(recertify(changed, region.proof).proof)
     assert set(statement.gaps) == set(changed.pairs)
     assert min(statement.gaps.values()) > 0
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_hand_of_several_bodies_shares_one_certificate_and_one_box_contains_it(seed):
+    scene = hand(seed=seed)
+    assert units(scene, together(scene, samples(scene), KEEP)) == [(0, 1, 2, 3)]
+    around, obstacle = volumes_of(scene, scene.pairs)
+    kinematics = ExactKinematics.at(scene, [])
+    check_volume(scene, kinematics, around)
+    assert len(around.vertices) == limits.CORNERS
+    assert obstacle.is_geometry_of(scene)
+    middle = around.vertices.mean(axis=0)
+    with pytest.raises(ProofError, match="not contained"):
+        check_volume(scene, kinematics, replace(around, vertices=middle + (1 - 1e-6) * (around.vertices - middle)))
+    s = np.random.default_rng(seed).uniform(-1, 1, size=(200, 2))
+    own = Kinematics.of(scene)
+    for geometry in scene.geometries[:4]:
+        inside = own.points(around.body, geometry.body, geometry.vertices, s)
+        assert (inside > around.vertices.min(axis=0)).all()
+        assert (inside < around.vertices.max(axis=0)).all()
+
+
+def test_a_region_of_an_arm_with_a_hand_is_proved_of_each_of_its_bodies():
+    scene = hand()
+    region = grow(scene, GrowthOptions(seed=box_seed([0.0, 0.0], 0.3), cells=600))
+    statement = verify_region(region.proof)
+    assert set(statement.gaps) == set(scene.pairs)
+    assert min(statement.gaps.values()) > 0
+    assert len({pair["proof_digest"] for pair in region.manifest["pairs"]}) == 1
+
+
+def test_a_volume_that_is_much_nearer_than_its_geometries_at_a_configuration_to_keep_is_divided():
+    scene = hand()
+    own, around = (min(distance(scene, [pair]) for pair in scene.pairs), distance(scene, scene.pairs))
+    most = around - own / 2  # either volume is padded
+    assert 0 < most < own / 2
+    for padding, joined in ((0.0, True), (most - 1e-6, True), (most + 1e-6, False)):
+        padded = replace(scene, padding=padding)
+        assert ((0, 1, 2, 3) in units(padded, together(padded, KEEP, KEEP))) is joined
+
+
+def distance(scene, pairs):
+    """Returns the distance of the volumes of pairs at the origin, in metres."""
+    kinematics, volumes = Kinematics.of(scene), volumes_of(scene, pairs)
+    return float(gaps(*(hull(kinematics, WORLD, v, v.radius, np.zeros(3), 1.0) for v in volumes), KEEP)[0])
