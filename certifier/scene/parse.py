@@ -111,12 +111,13 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     semantics = read_semantics(scene_file, tree.bodies)
     described = [entry for one in semantics for entry in one.ignore]
     wanted, ignored, unused = pairs(candidates, geometries, tree, scene_file.ignore, described)
+    padded, without = scene_file.paddings.on(wanted, geometries, tree.bodies)
     scene = Scene(
         name=scene_file.name,
         joints=tree.joints,
         bodies=tree.bodies,
         geometries=geometries,
-        pairs=wanted,
+        pairs=padded,
         ignored=ignored,
         q_star=q_star,
         padding=scene_file.padding,
@@ -132,7 +133,7 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     states, left_out = srdf_configurations(scene, semantics, at)
     files = {entry.reason: one.file for one in semantics for entry in one.ignore}
     document = replace(scene, configurations=states | own_configurations(scene, scene_file.configurations)).to_document()
-    document["warnings"] = warnings + unused + left_out + findings(scene, tree, candidates, drawn, files)
+    document["warnings"] = warnings + unused + without + left_out + findings(scene, tree, candidates, drawn, files)
     return document
 
 
@@ -305,7 +306,7 @@ def _geometries(
             found[i] = _placed(name, body_name, convex, X_BG)
             if convex.beyond:
                 reached[name] = convex.beyond
-    reach = tree.reach(list(found.values()), scene_file.padding)
+    reach = tree.reach(list(found.values()), scene_file.largest_padding)
     for i, name, body_name in half_spaces:
         if body_name not in tree.anchored:
             message = f"geometry {name} is a half-space on a body that moves"
