@@ -31,6 +31,7 @@ from certifier.proof.negative import DualProof, WitnessProof
 from certifier.proof.pair import PairProof
 from certifier.proof.partition import PartitionProof
 from certifier.proof.region import RegionProof
+from certifier.scene.contacts import touching as overlapping
 from certifier.scene.drake_model import build_diagram, geometry_name
 from certifier.seeding.coarse_pairs import with_coarse_pairs
 from certifier.seeding.drake_iris import checker
@@ -94,6 +95,7 @@ def test_all_that_says_what_is_free_means_the_same_distances():
     q, touching, free, distances = q[clear], [t for t, c in zip(touching, clear, strict=True) if c], free[clear], distances[clear]
     s = scene.to_s(q)
     assert contacts(scene, s) == touching
+    assert [{scene.pairs[i] for i in pairs} for pairs in touching] == list(overlapping(scene, q))
     assert np.array_equal(in_collision(scene, s), ~free)
     assert np.array_equal(free_at_all(bodies_of(scene), seen_of(scene), q, np.arange(6)), free)
     assert [clearance_.free(x) for x in q] == free.tolist()

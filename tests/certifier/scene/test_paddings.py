@@ -52,7 +52,10 @@ def test_the_padding_of_each_pair_is_what_the_file_says(tmp_path, said, expected
 
 def test_what_concerns_no_pair_gives_a_warning(tmp_path):
     said = "{bodies: {world: 0.1}, pairs: [{pair: [arm/base, arm/hand], padding: 0.1}]}"
-    warnings = ["padding.bodies.world: world has no pair to certify", "padding.pairs[0].pair: arm/base and arm/hand have no pair to certify"]
+    warnings = [
+        "padding.bodies.world: world has no pair to certify",
+        "padding.pairs[0].pair: arm/base and arm/hand have no pair to certify",
+    ]
     assert paddings(tmp_path, said) == ((0, 0, 0, 0, 0), warnings)
     both = "{pairs: [{pair: [arm/tip, room/walls], padding: 0.1}, {pair: [room/walls, arm/tip], padding: 0.2}]}"
     assert paddings(tmp_path, both) == ((0, 0, 0, 0.1, 0.1), ["padding.pairs[1].pair: room/walls and arm/tip have no pair to certify"])
@@ -81,3 +84,13 @@ def test_a_half_space_reaches_as_far_as_the_largest_padding(tmp_path, said):
     assert read_scene_file(path).largest_padding == 0.4
     slab = parsed(path).geometry("room/walls/wall").vertices
     assert np.abs(slab[:, :2]).max() >= 0.3 + 0.3 + 2 * 0.4
+
+
+def test_a_pair_that_is_always_nearer_than_its_padding_gives_a_warning(tmp_path):
+    """The foot and the tip are 0.3 to 0.6 m apart."""
+    scene = parsed(write(tmp_path, more=MORE, extra="padding: {pairs: [{pair: [arm/base, arm/tip/left], padding: 0.4}]}\n"))
+    foot = "arm/base/foot and arm/tip/left are nearer than a padding of 0.4 m on each in every configuration tried"
+    assert [w for w in scene.warnings if "every configuration" in w] == [
+        f"{foot}: mend the geometry, or ignore the pair with a reason, or give it less padding"
+    ]
+    assert not [w for w in parsed(write(tmp_path, more=MORE)).warnings if "every configuration" in w]
