@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,9 +14,11 @@ from certifier.carry.carry import carry
 from certifier.collisions.free import free_at_all
 from certifier.collisions.seen import seen_of
 from certifier.errors import CirisError, ProofError, SceneError
-from certifier.jobs.clearance import clearance
+from certifier.jobs.clearance import _Distances, clearance
 from certifier.jobs.motion import certify
+from certifier.jobs.reference import Reference
 from certifier.jobs.region import certified_region
+from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Array, Pair, Scene, Volume
 from certifier.motion.bodies import bodies_of
 from certifier.motion.given import given
@@ -23,7 +26,10 @@ from certifier.motion.search import search
 from certifier.outcome import Outcome
 from certifier.pair.certification import Certification
 from certifier.pair.collisions import contacts, in_collision
+from certifier.pair.collisions import touching as touching_volumes
+from certifier.partition.area import Area
 from certifier.partition.certification import CellCertification
+from certifier.partition.levels import levels_of
 from certifier.partition.shared import Shared
 from certifier.partition.together import together
 from certifier.proof.motion import Space
@@ -44,7 +50,7 @@ from certifier.verify.separations import verify_separation
 from certifier.verify.witness import verify_witness
 from planner.sampling.ends import in_collision as deepest
 from tests.certifier.proofs import region
-from tests.certifier.scenes import accepted, ball, beads, box, cube, planar_arm
+from tests.certifier.scenes import accepted, ball, beads, box, cube, planar_arm, two_arms
 
 BLOCK, POST = "world/block", "world/post"
 OWN = {("arm/link1/bar", BLOCK): 0.0, ("arm/link2/tip", BLOCK): 0.15, ("arm/link2/tip", POST): 0.002}
@@ -291,6 +297,42 @@ def with_padding(scene: Scene, tip) -> dict[tuple[str, str], float]:
         wider = with_coarse_pairs(scene, {(None, None): (tip, other)})
         found["tip", name] = wider.padding_of(wider.pairs[-1])
     return found
+
+
+@pytest.fixture(params=[0.0, 0.02, 0.3])
+def twins(request) -> Callable[[Scene], tuple[Scene, Scene]]:
+    """A scene with a padding, and one whose pairs all have it as their own, while the scene's is another."""
+
+    def made(scene: Scene) -> tuple[Scene, Scene]:
+        own = tuple(replace(pair, padding=request.param) for pair in scene.pairs)
+        return replace(scene, padding=request.param), replace(scene, padding=0.11, pairs=own)
+
+    return made
+
+
+def test_a_padding_of_all_pairs_is_the_padding_of_the_scene(twins):
+    """What has no oracle of its own answers the same for both scenes: pairs joined, levels of volumes, volumes that touch, distances."""
+    samples = np.random.default_rng(0).uniform(-0.4, 0.4, (300, 2))
+    one, other = (together(scene, samples, samples[:1]) for scene in twins(beads()))
+    assert one == other
+    hands = two_arms(3, apart=6.5)
+    one, other = (levels_of(Area.of(s, cube(s, 0.3, 0.4), 0), WORLD, volumes(s, s.pairs[-1])) for s in twins(hands))
+    assert one.levels == other.levels
+    one, other = (touching_volumes(Kinematics.of(s), volumes(s, s.pairs[4]), s.to_s(samples)) for s in twins(arm({})))
+    assert np.array_equal(one, other)
+    one, other = (_Distances(s).of(s.pairs[4], s.to_s(samples[:9])) for s in twins(arm({})))
+    assert np.array_equal(one, other)
+
+
+def test_drakes_programs_refuse_padding_of_a_pair():
+    scene = arm({("arm/link2/tip", BLOCK): 0.1}, padding=0.0)
+    with pytest.raises(SceneError, match="no padding"):
+        Reference(scene)
+    Reference(arm({(p.a, p.b): 0.0 for p in scene.pairs}, padding=0.1))
+
+
+def volumes(scene: Scene, pair: Pair) -> tuple[Volume, Volume]:
+    return volume(scene, pair.a), volume(scene, pair.b)
 
 
 def test_a_scene_without_paddings_of_pairs_has_the_document_and_the_hash_of_before():
