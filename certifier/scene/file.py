@@ -30,6 +30,8 @@ KEYS = (
     "xacro",
 )
 """The keys of a scene file."""
+SWEPT = "swept"
+"""The word for a joint in ``fix`` that is not held at a position."""
 MAX_BYTES = 2**20
 MIN_HULL_VERTICES = 8
 MAX_VERTICES, MAX_SIDES = 512, 128
@@ -59,6 +61,7 @@ class SceneFile:
         q_star: (n,) centre of the parametrisation, radians or metres; None for the middle of the joint limits.
         limits: narrower limits by joint, radians or metres.
         fix: positions by joint, radians or metres, at which joints are held.
+        swept: joints of which everything behind them counts at all positions.
         padding: metres that are added around both geometries of every pair that ``paddings`` does not concern.
         paddings: what the file says of the padding of bodies and of pairs.
         ignore: the pairs that are not certified.
@@ -79,6 +82,7 @@ class SceneFile:
     q_star: tuple[float, ...] | None = None
     limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     fix: dict[str, float] = field(default_factory=dict)
+    swept: tuple[str, ...] = ()
     padding: float = 0.0
     paddings: Paddings = field(default_factory=Paddings)
     ignore: tuple[IgnoreEntry, ...] = field(default=())
@@ -115,6 +119,7 @@ def read_scene_file(path: Path) -> SceneFile:
     mesh = _section(values.get("mesh", {}), "mesh", ("mode", "max_vertices"))
     if mesh.get("mode", "hull") != "hull":
         raise _wrong("mesh.mode", f"must be hull, not {mesh['mode']!r}")
+    fix = _by_joint(values.get("fix", {}), "fix")
     padding, paddings = _padding(values.get("padding", 0.0))
     directives = nodes["directives"]
     _check_directives(directives, path.name)
@@ -127,7 +132,8 @@ def read_scene_file(path: Path) -> SceneFile:
         models=tuple(added.file for added in added_files(directives)),
         q_star=_q_star(values.get("q_star")),
         limits=_limits(values.get("limits", {})),
-        fix={name: _number(value, f"fix.{name}") for name, value in _by_joint(values.get("fix", {}), "fix").items()},
+        fix={name: _position(value, f"fix.{name}") for name, value in fix.items() if value != SWEPT},
+        swept=tuple(name for name, value in fix.items() if value == SWEPT),
         padding=padding,
         paddings=paddings,
         ignore=_ignore(values.get("ignore", [])),
@@ -316,6 +322,12 @@ def _by_joint(value: Any, where: str) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise _wrong(where, "must map names of joints to numbers")
     return {_name(name, where): content for name, content in value.items()}
+
+
+def _position(value: Any, where: str) -> float:
+    if isinstance(value, str):
+        raise _wrong(where, f"must be a position, in radians or metres, or the word {SWEPT}, not {value!r}")
+    return _number(value, where)
 
 
 def _limits(value: Any) -> dict[str, tuple[float, float]]:

@@ -13,6 +13,7 @@ import re
 import sys
 import tempfile
 import textwrap
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -59,6 +60,7 @@ from certifier.scene.names import Names
 from certifier.scene.pairs import pairs
 from certifier.scene.semantics import read_semantics
 from certifier.scene.strict import StrictReader
+from certifier.scene.sweep import Sweep, check_not_swept, others_of, said_of, sweeps_of, swept
 from certifier.scene.tree import Tree, floating
 
 _IGNORED_SHAPE = re.compile(r"geom \S+ specified unknown mesh|The geom type|The fromto tag")
@@ -98,11 +100,15 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     names = Names(plant, inspector)
     warnings += without_limits(strict, plant, names)
     every = [joint_of(plant.get_joint(index), names) for index in plant.GetJointIndices()]
-    at = held_at(every, scene_file.fix, couplings(plant, names))
-    joints, q_star = centered(narrowed(held(every, at), scene_file.limits), scene_file.q_star)
+    coupled = couplings(plant, names)
+    sweeps = sweeps_of(every, scene_file.swept, scene_file.limits, coupled)
+    at = held_at(every, scene_file.fix, coupled, sweeps)
+    welded = at | {name: sweep.middle for name, sweep in sweeps.items()}
+    limits = others_of(scene_file.limits, sweeps, every)
+    joints, q_star = centered(narrowed(held(every, welded), limits), scene_file.q_star)
     tree = Tree(joints, list(names.bodies))
     reached: dict[str, float] = {}
-    parts = _geometries(scene_file, strict, copies, plant, inspector, tree, names, reached)
+    parts = _geometries(scene_file, strict, copies, plant, inspector, tree, sweeps, names, reached)
     by_id = with_hulls(parts, scene_file.hulls, tree.bodies, scene_file.max_vertices, names.register, reached)
     candidates = list(dict.fromkeys((by_id[a].name, by_id[b].name) for a, b in inspector.GetCollisionCandidates()))
     geometries = tuple({id(geometry): geometry for geometry in by_id.values()}.values())
@@ -133,7 +139,7 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     states, left_out = srdf_configurations(scene, semantics, at)
     files = {entry.reason: one.file for one in semantics for entry in one.ignore}
     document = replace(scene, configurations=states | own_configurations(scene, scene_file.configurations)).to_document()
-    document["warnings"] = warnings + unused + without + left_out + findings(scene, tree, candidates, drawn, files)
+    document["warnings"] = warnings + said_of(sweeps) + unused + without + left_out + findings(scene, tree, candidates, drawn, files)
     return document
 
 
@@ -286,6 +292,7 @@ def _geometries(
     plant: MultibodyPlant,
     inspector: SceneGraphInspector,
     tree: Tree,
+    sweeps: Mapping[str, Sweep],
     names: Names,
     reached: dict[str, float],
 ) -> dict[GeometryId, Geometry]:
@@ -306,11 +313,13 @@ def _geometries(
             found[i] = _placed(name, body_name, convex, X_BG)
             if convex.beyond:
                 reached[name] = convex.beyond
+    found = swept(found, tree, sweeps, scene_file.max_vertices)
     reach = tree.reach(list(found.values()), scene_file.largest_padding)
     for i, name, body_name in half_spaces:
         if body_name not in tree.anchored:
             message = f"geometry {name} is a half-space on a body that moves"
             raise SceneError("unsupported_shape", message, field="directives", hint="use a box")
+        check_not_swept(name, body_name, tree, sweeps)
         X_BG = inspector.GetPoseInFrame(i)
         center = (RigidTransform(tree.anchored[body_name]) @ X_BG).inverse().translation()
         found[i] = _placed(name, body_name, shapes.half_space(center, reach), X_BG)
