@@ -137,7 +137,8 @@ def swept(geometries: Mapping[_Key, Geometry], tree: Tree, sweeps: Mapping[str, 
         SceneError: ``unsupported_joint`` for a joint that moves behind one that is swept; ``hull``, as :func:`outer`.
     """
     above = {joint.child: joint for joint in tree.joints}
-    return {key: _swept(geometry, _Chain(geometry.body, above, sweeps), max_vertices) for key, geometry in geometries.items()}
+    chains = {body: _Chain(body, above, sweeps) for body in tree.bodies}
+    return {key: _swept(geometry, chains[geometry.body], max_vertices) for key, geometry in geometries.items()}
 
 
 def said_of(sweeps: Mapping[str, Sweep]) -> list[str]:
@@ -150,7 +151,8 @@ def said_of(sweeps: Mapping[str, Sweep]) -> list[str]:
         unit = of_it[0].joint.unit
         found.append(
             f"joint {leader} is swept from {of_it[0].lower:.9g} to {of_it[0].upper:.9g} {unit}{following}: what hangs on it counts at all "
-            "positions at once; it makes no pair with what it is mounted on, nor with what else is mounted there without a joint that moves"
+            "positions at once, and its frames are those at the middle; it makes no pair with what it is mounted on, nor with what else is "
+            "mounted there without a joint that moves"
         )
     return found
 

@@ -225,7 +225,9 @@ def test_the_scene_says_what_is_swept(tmp_path):
     assert scene.hash != still.hash
 
 
+LAST = f'<joint name="last" type="prismatic"><parent link="disc"/><child link="flange"/>{LIMITS.format(0, 1)}</joint><link name="flange"/>'
 SPIN = '<joint name="spin" type="continuous"><parent link="hand"/><child link="disc"/><axis xyz="0 0 1"/></joint><link name="disc"/>'
+TURN = SPIN.replace("continuous", "revolute").replace("</joint>", LIMITS.format(-1, 1) + "</joint>")
 
 
 @pytest.mark.parametrize(
@@ -238,6 +240,13 @@ SPIN = '<joint name="spin" type="continuous"><parent link="hand"/><child link="d
         (slides("box"), "fix: {grip: swept}\nlimits: {grip: [0, 1]}\n", "scene_field", "limits.arm/grip", "own limits"),
         (slides("box"), "fix: {gripp: swept}\n", "unknown_name", "fix.gripp", "arm/grip"),
         (SPIN, "fix: {spin: swept}\n", "joint_range", "fix.arm/spin", "no finite limits"),
+        (
+            SPIN.replace("continuous", "revolute").replace("</joint>", LIMITS.format(-1, 1) + "</joint>") + LAST,
+            "fix: {spin: swept}\n",
+            "unsupported_joint",
+            "fix.arm/spin",
+            "arm/last moves",
+        ),
         (mixed("box"), "fix: {lift: swept}\n", "unsupported_joint", "fix.arm/lift", "arm/grip moves"),
         (slides("box"), "fix: {turn: swept, grip: swept}\n", "no_joints", "directives", "no joint of the scene can move"),
     ],
@@ -264,3 +273,14 @@ def test_a_half_space_cannot_be_swept(tmp_path):
     scene_file = SCENE + "  - add_model: {name: lid, file: lid.sdf}\n  - add_weld: {parent: world, child: lid::frame}\n"
     with pytest.raises(SceneError, match="half-space behind a joint that is swept"):
         parsed(write(tmp_path, scene_file, extra="fix: {hinge: swept}\n", files={"lid.sdf": lid}))
+
+
+def test_states_of_a_group_that_is_swept_count_for_the_other_joints(tmp_path):
+    states = """<robot name="arm"><group_state name="open" group="hand"><joint name="grip" value="0.04"/></group_state>
+      <group_state name="home" group="all"><joint name="turn" value="0.5"/><joint name="grip" value="0.01"/></group_state></robot>"""
+    extra = "fix: {grip: swept}\nsrdf: {arm: arm.srdf}\n"
+    scene = parsed(write(tmp_path, more=slides("box"), extra=extra, files={"arm.srdf": states}))
+    assert scene.configurations == {"arm/all/home": {"arm/turn": 0.5}}
+    assert [w for w in scene.warnings if "left out" in w] == [
+        "arm.srdf:1: the state arm/hand/open is left out: it names no joint that can move"
+    ]
