@@ -45,6 +45,7 @@ from certifier.seeding.free import Clearance, check_free
 from certifier.verify.dual import verify_dual
 from certifier.verify.file import verify_file
 from certifier.verify.motion import verify_motion
+from certifier.verify.paddings import paddings
 from certifier.verify.region import verify_region
 from certifier.verify.separations import verify_separation
 from certifier.verify.witness import verify_witness
@@ -365,3 +366,21 @@ def test_a_proof_with_an_impossible_padding_is_refused(padding):
     changed = replace(scene, pairs=(replace(scene.pairs[0], padding=padding), *scene.pairs[1:]))
     with pytest.raises(ProofError, match="the padding"):
         verify_separation(replace(proof, scene=changed))
+
+
+def test_a_statement_has_one_line_for_two_bodies_where_all_their_pairs_are_alike():
+    scene = arm({("arm/link2/bar", BLOCK): 0.1, ("arm/link2/bar", POST): 0.1, ("arm/link2/tip", BLOCK): 0.1, ("arm/link2/tip", POST): 0.1})
+    assert paddings(scene) == [
+        "padding 0.03 m around every body, but in 4 pairs:",
+        "  0.1 m: all 4 pairs of the bodies 'arm/link2' and 'world'",
+    ]
+    mixed = replace(scene, pairs=tuple(replace(p, padding=0.2) if i == 2 else p for i, p in enumerate(scene.pairs)))
+    assert paddings(mixed)[1:] == [
+        "  0.2 m: 'arm/link2/bar' and 'world/block'",
+        "  0.1 m: 'arm/link2/bar' and 'world/post'",
+        "  0.1 m: 'arm/link2/tip' and 'world/block'",
+        "  0.1 m: 'arm/link2/tip' and 'world/post'",
+    ]
+    usual = replace(scene, pairs=tuple(replace(p, padding=None) if i == 2 else p for i, p in enumerate(scene.pairs)))
+    assert len(paddings(usual)) == 4
+    assert paddings(arm({}, padding=0.0)) == ["padding 0.0 m around every body"]
