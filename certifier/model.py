@@ -93,7 +93,8 @@ class Geometry:
         shape: what the file said, JSON-able: ``{"kind": "box", "size": [x, y, z], "X_BG": 4x4 list}`` and so on.
         substitution: None when vertices and radius describe the shape exactly, else a sentence that names the conservative
             replacement (mesh -> hull with V vertices, cylinder -> prism ...).
-        inflation: upper bound in metres on how far the replacement reaches outside the shape, or outside the hull of a mesh.
+        inflation: upper bound in metres on how far the replacement reaches outside the shape, or outside the hull of a mesh; behind a
+            joint that is swept, outside the hull of all its places.
     """
 
     name: str
