@@ -17,7 +17,7 @@ from certifier.errors import CirisError, ProofError, SceneError
 from certifier.jobs.clearance import _Distances, clearance
 from certifier.jobs.motion import certify
 from certifier.jobs.reference import Reference
-from certifier.jobs.region import certified_region
+from certifier.jobs.region import Region, certified_region
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Array, Pair, Scene, Volume
 from certifier.motion.bodies import bodies_of
@@ -204,18 +204,21 @@ def test_that_no_certificate_exists_is_about_the_padding_of_its_pair():
                 verify_dual(replace(proof, scene=changed))
 
 
-def certified(scene: Scene, polytope) -> bytes:
+def certified(scene: Scene, polytope) -> Region:
     shared = CellCertification(scene, polytope)
     results = [shared.certify(i, 2000) for i in range(len(scene.pairs))]
     assert {r.outcome for r in results} == {Outcome.CERTIFIED}
     center = scene.to_s(INSIDE)
-    return certified_region(scene, accepted(polytope, center), {i: r.proof for i, r in enumerate(results)}, {}).proof
+    return certified_region(scene, accepted(polytope, center), {i: r.proof for i, r in enumerate(results)}, {})
 
 
 def test_a_region_states_the_paddings_that_it_is_about():
     scene = arm()
     polytope = cube(scene, scene.to_s(INSIDE), 0.05)
-    data = certified(scene, polytope)
+    made = certified(scene, polytope)
+    data = made.proof
+    assert [p["padding"] for p in made.manifest["pairs"]] == [OWN.get((p.a, p.b), 0.03) for p in scene.pairs]
+    assert made.manifest["padding"] == 0.03
     lines = verify_file(data).lines
     at = lines.index("padding 0.03 m around every body, but in 3 pairs:")
     assert lines[at + 1 : at + 4] == tuple(f"  {padding} m: '{a}' and '{b}'" for (a, b), padding in OWN.items())
@@ -234,7 +237,7 @@ def test_a_region_states_the_paddings_that_it_is_about():
 def test_the_clearance_of_a_region_is_beyond_the_padding_of_each_pair():
     scene = arm()
     polytope = cube(scene, scene.to_s(INSIDE), 0.02)
-    found, drake = clearance(certified(scene, polytope)), Drake(scene)
+    found, drake = clearance(certified(scene, polytope).proof), Drake(scene)
     assert found.nearest.distance == pytest.approx(drake(scene.to_q(found.nearest.s)).min(), abs=1e-6)
     assert 0.85 * found.nearest.distance < found.distance <= found.nearest.distance
     if found.proof:
@@ -243,7 +246,7 @@ def test_the_clearance_of_a_region_is_beyond_the_padding_of_each_pair():
 
 def test_a_proof_is_carried_over_where_the_padding_of_its_own_pairs_stays():
     scene = arm()
-    old = RegionProof.from_bytes(certified(scene, cube(scene, scene.to_s(INSIDE), 0.05)))
+    old = RegionProof.from_bytes(certified(scene, cube(scene, scene.to_s(INSIDE), 0.05)).proof)
     changed = arm({**OWN, ("arm/link2/tip", BLOCK): 0.14})
     carried = carry(old, changed).proofs
     index = changed.pairs.index(Pair("arm/link2/tip", BLOCK))
