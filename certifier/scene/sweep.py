@@ -8,7 +8,7 @@ at most ARC, and each point becomes the corners of these triangles. Behind sever
 body to the world. Where joints follow the same one, this is done for PARTS of its range, as otherwise each would count at all positions of
 the others.
 
-Last, the hull is larger by GROWTH about its middle. That is far more than the rounding errors of all of this.
+Last, the hull is made larger by SLACK on all sides.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from certifier.errors import SceneError
 from certifier.kinematics import rigid_inverse, rotation
 from certifier.model import Array, Geometry, Joint, JointKind
-from certifier.scene.hull import hull_vertices, nearest_in_hull, outer
+from certifier.scene.hull import hull_vertices, nearest_in_hull, outer, thickened
 from certifier.scene.joints import EXACT, Coupling, by_full_name, narrowed, range_of
 from certifier.scene.shapes import ellipsoid
 from certifier.scene.tree import Tree, turned
@@ -34,8 +35,10 @@ ARC = 0.1
 PARTS = 8
 SAMPLES = 9
 """The inflation is measured from the places at this many positions of each joint that is named."""
-GROWTH, ROUNDING = 1e-8, 1e-9
-"""Inflations are larger by the second one, in metres, than the distances that are computed."""
+SLACK = 1e-11
+"""Bodies are larger by this part of the farthest distance from an origin: far more than the rounding errors of moving points."""
+ROUNDING = 1e-9
+"""Inflations are larger by this part, and by as many metres, than the distances that are computed."""
 
 _Key = TypeVar("_Key")
 
@@ -203,6 +206,11 @@ class _Chain:
             found.append(moved)
         return hull_vertices(np.concatenate(found))
 
+    def reach(self, points: Array) -> float:
+        """Returns a length, in metres, that the points (k, 3), moved, are no farther away than from the origin of any frame on the way."""
+        ways = (2 * np.linalg.norm(X[:3, 3]) + abs(sweep.at(sweep.upper) - sweep.at(sweep.lower)) for sweep, _, X in self.steps)
+        return 1.1 * float(np.linalg.norm(points, axis=1).max() + sum(ways))
+
     def places(self, points: Array) -> Array:
         """Returns the points (k, 3), in the body's frame, at some of the positions, the ends of all ranges among them."""
         leaders = {sweep.leader: np.linspace(sweep.lower, sweep.upper, SAMPLES) for sweep, *_ in self.steps}
@@ -224,15 +232,25 @@ def _swept(geometry: Geometry, chain: _Chain, max_vertices: int) -> Geometry:
     if radius and len(points) > 2:  # nothing but balls and capsules has a radius
         ball = ellipsoid((radius, radius, radius), max_vertices)
         points, radius = hull_vertices((points[:, None] + ball.vertices).reshape(-1, 3)), 0.0
-    middle = points.mean(axis=0)
-    points, radius = middle + (1 + GROWTH) * (points - middle), radius * (1 + GROWTH)
-    vertices = points if radius else outer(points, max_vertices)[0]
+    slack = SLACK * chain.reach(geometry.vertices)
+    if radius:
+        vertices, radius = points, radius + slack
+    else:
+        vertices, _, _ = outer(_grown(points, slack), max_vertices)
     places = hull_vertices(chain.places(geometry.vertices))
     reaches = max(nearest_in_hull(vertex, places)[1] for vertex in vertices)
-    inflation = geometry.inflation + (1 + GROWTH) * (reaches + radius - geometry.radius) + ROUNDING
+    inflation = geometry.inflation + (1 + ROUNDING) * (reaches + radius - geometry.radius) + ROUNDING
     before = geometry.substitution or geometry.shape["kind"]
     substitution = f"{before} -> hull of {len(vertices)} vertices around all positions of {names}"
     return replace(geometry, vertices=vertices, radius=radius, substitution=substitution, inflation=inflation)
+
+
+def _grown(points: Array, slack: float) -> Array:
+    """Returns points whose hull contains all balls of the radius ``slack``, in metres, about the points of the hull of points (k, 3)."""
+    points = thickened(points)
+    middle = points.mean(axis=0)
+    depth = float(-ConvexHull(points - middle).equations[:, 3].max())
+    return middle + (1 + slack / depth) * (points - middle)
 
 
 def _moved(joint: Joint, points: Array, lower: float, upper: float) -> Array:
