@@ -13,7 +13,6 @@ import re
 import sys
 import tempfile
 import textwrap
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -60,7 +59,7 @@ from certifier.scene.names import Names
 from certifier.scene.pairs import pairs
 from certifier.scene.semantics import read_semantics
 from certifier.scene.strict import StrictReader
-from certifier.scene.sweep import Sweep, check_not_swept, others_of, said_of, sweeps_of, swept
+from certifier.scene.sweep import Sweeper, others_of, said_of, sweeps_of
 from certifier.scene.tree import Tree, floating
 
 _IGNORED_SHAPE = re.compile(r"geom \S+ specified unknown mesh|The geom type|The fromto tag")
@@ -108,7 +107,7 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     joints, q_star = centered(narrowed(held(every, welded), limits), scene_file.q_star)
     tree = Tree(joints, list(names.bodies))
     reached: dict[str, float] = {}
-    parts = _geometries(scene_file, strict, copies, plant, inspector, tree, sweeps, names, reached)
+    parts = _geometries(scene_file, strict, copies, plant, inspector, tree, Sweeper(tree, sweeps, scene_file.max_vertices), names, reached)
     by_id = with_hulls(parts, scene_file.hulls, tree.bodies, scene_file.max_vertices, names.register, reached)
     candidates = list(dict.fromkeys((by_id[a].name, by_id[b].name) for a, b in inspector.GetCollisionCandidates()))
     geometries = tuple({id(geometry): geometry for geometry in by_id.values()}.values())
@@ -292,7 +291,7 @@ def _geometries(
     plant: MultibodyPlant,
     inspector: SceneGraphInspector,
     tree: Tree,
-    sweeps: Mapping[str, Sweep],
+    sweeper: Sweeper,
     names: Names,
     reached: dict[str, float],
 ) -> dict[GeometryId, Geometry]:
@@ -310,16 +309,15 @@ def _geometries(
         else:
             X_BG = inspector.GetPoseInFrame(i)
             convex = _convex(inspector.GetShape(i), name, scene_file, strict, copies)
-            found[i] = _placed(name, body_name, convex, X_BG)
+            found[i] = sweeper.around(_placed(name, body_name, convex, X_BG))
             if convex.beyond:
                 reached[name] = convex.beyond
-    found = swept(found, tree, sweeps, scene_file.max_vertices)
     reach = tree.reach(list(found.values()), scene_file.largest_padding)
     for i, name, body_name in half_spaces:
         if body_name not in tree.anchored:
             message = f"geometry {name} is a half-space on a body that moves"
             raise SceneError("unsupported_shape", message, field="directives", hint="use a box")
-        check_not_swept(name, body_name, tree, sweeps)
+        sweeper.check_half_space(name, body_name)
         X_BG = inspector.GetPoseInFrame(i)
         center = (RigidTransform(tree.anchored[body_name]) @ X_BG).inverse().translation()
         found[i] = _placed(name, body_name, shapes.half_space(center, reach), X_BG)

@@ -17,7 +17,6 @@ import itertools
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 from scipy.spatial import ConvexHull
@@ -39,8 +38,6 @@ SLACK = 1e-11
 """Bodies are larger by this part of the farthest distance from an origin: far more than the rounding errors of moving points."""
 ROUNDING = 1e-9
 """Inflations are larger by this part, and by as many metres, than the distances that are computed."""
-
-_Key = TypeVar("_Key")
 
 
 @dataclass(frozen=True)
@@ -129,19 +126,39 @@ def _follower(joint: Joint, sweep: Sweep, coupling: Coupling) -> Sweep:
     return found
 
 
-def swept(geometries: Mapping[_Key, Geometry], tree: Tree, sweeps: Mapping[str, Sweep], max_vertices: int) -> dict[_Key, Geometry]:
-    """Returns the geometries, those behind joints that are swept with the bodies that contain them at all positions.
+class Sweeper:
+    """Makes the bodies that stand for geometries behind joints that are swept.
 
     Args:
         tree: its joints that are swept are welds at :attr:`Sweep.middle`.
         max_vertices: such a body has at most this many vertices.
 
     Raises:
-        SceneError: ``unsupported_joint`` for a joint that moves behind one that is swept; ``hull``, as :func:`outer`.
+        SceneError: ``unsupported_joint`` for a joint that moves behind one that is swept.
     """
-    above = {joint.child: joint for joint in tree.joints}
-    chains = {body: _Chain(body, above, sweeps) for body in tree.bodies}
-    return {key: _swept(geometry, chains[geometry.body], max_vertices) for key, geometry in geometries.items()}
+
+    def __init__(self, tree: Tree, sweeps: Mapping[str, Sweep], max_vertices: int) -> None:
+        above = {joint.child: joint for joint in tree.joints}
+        self._chains = {body: _Chain(body, above, sweeps) for body in tree.bodies}
+        self._max_vertices = max_vertices
+
+    def around(self, geometry: Geometry) -> Geometry:
+        """Returns a body that contains the geometry at all positions of the joints that are swept; the geometry itself without any.
+
+        Raises:
+            SceneError: ``hull``, as :func:`certifier.scene.hull.outer`.
+        """
+        return _swept(geometry, self._chains[geometry.body], self._max_vertices)
+
+    def check_half_space(self, name: str, body: str) -> None:
+        """Refuses a half-space behind a joint that is swept: its part within the robot's reach is not the same at all positions.
+
+        Raises:
+            SceneError: ``unsupported_shape``.
+        """
+        if self._chains[body].steps:
+            message = f"geometry {name} is a half-space behind a joint that is swept"
+            raise SceneError("unsupported_shape", message, field="directives", hint="use a box, or hold the joint by fix")
 
 
 def said_of(sweeps: Mapping[str, Sweep]) -> list[str]:
@@ -158,17 +175,6 @@ def said_of(sweeps: Mapping[str, Sweep]) -> list[str]:
             "mounted there without a joint that moves"
         )
     return found
-
-
-def check_not_swept(name: str, body: str, tree: Tree, sweeps: Mapping[str, Sweep]) -> None:
-    """Refuses a half-space behind a joint that is swept: its part within the robot's reach is not the same at all positions.
-
-    Raises:
-        SceneError: ``unsupported_shape``.
-    """
-    if _Chain(body, {joint.child: joint for joint in tree.joints}, sweeps).steps:
-        message = f"geometry {name} is a half-space behind a joint that is swept"
-        raise SceneError("unsupported_shape", message, field="directives", hint="use a box, or hold the joint by fix")
 
 
 class _Chain:
