@@ -89,11 +89,12 @@ class Geometry:
         name: ``model/body/geometry``.
         body: ``model/body``, or ``world``.
         vertices: (v, 3) metres in the body's frame. A sphere has one vertex, a capsule has two.
-        radius: metres, 0 for a polytope. The scene's padding is *not* included.
+        radius: metres, 0 for a polytope. The padding is *not* included.
         shape: what the file said, JSON-able: ``{"kind": "box", "size": [x, y, z], "X_BG": 4x4 list}`` and so on.
         substitution: None when vertices and radius describe the shape exactly, else a sentence that names the conservative
             replacement (mesh -> hull with V vertices, cylinder -> prism ...).
-        inflation: upper bound in metres on how far the replacement reaches outside the shape, or outside the hull of a mesh.
+        inflation: upper bound in metres on how far the replacement reaches outside the shape, or outside the hull of a mesh; behind a
+            joint that is swept, outside the hull of all its places.
     """
 
     name: str
@@ -107,10 +108,16 @@ class Geometry:
 
 @dataclass(frozen=True)
 class Pair:
-    """A pair names two geometries that must not touch; a < b in string order."""
+    """A pair names two geometries that must not touch; a < b in string order. Pairs of the same names are equal.
+
+    Attributes:
+        padding: metres that are added around both geometries in this pair; None where the scene's padding counts. Of a scene's pair,
+            :meth:`Scene.padding_of` says which one it is.
+    """
 
     a: str
     b: str
+    padding: float | None = field(default=None, compare=False, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -134,7 +141,7 @@ class Scene(ConfigurationSpace):
         pairs: the pairs of geometries to certify.
         ignored: the pairs of geometries that are not certified by request.
         q_star: (n,) centre of the parametrisation, radians or metres.
-        padding: metres that are added around every geometry of every pair (both sides).
+        padding: metres that are added around both geometries of every pair that has no padding of its own.
         warnings: lint findings, sentences for people.
         provenance: how the scene was made (directives, package roots, Drake's version, how far hulls reach beyond their meshes); not part
             of the hash.
@@ -253,6 +260,35 @@ class Scene(ConfigurationSpace):
         """Returns the pairs that contain the geometry called ``name``, each with its index in ``pairs``."""
         return self._pairs_of.get(name, [])
 
+    @cached_property
+    def _own_paddings(self) -> dict[Pair, float]:
+        return {pair: pair.padding for pair in self.pairs if pair.padding is not None}
+
+    def padding_of(self, pair: Pair) -> float:
+        """Returns how many metres are added around both geometries of the scene's pair with these names."""
+        return self._own_paddings.get(pair, self.padding)
+
+    @property
+    def largest_padding(self) -> float:
+        """Returns the largest padding of a pair, or that of the scene if it is larger, in metres."""
+        return max(self.padding, *self._own_paddings.values()) if self._own_paddings else self.padding
+
+    def other_paddings(self) -> dict[Pair, float]:
+        """Returns the pairs with another padding than the scene's, and how many metres it is."""
+        return {pair: padding for pair, padding in self._own_paddings.items() if padding != self.padding}
+
+    def pairs_between(self, volumes: tuple[Volume, Volume]) -> tuple[Pair, ...]:
+        """Returns the pairs with one geometry in the first volume and the other one in the second, in their order."""
+        first, second = (set(volume.geometries) for volume in volumes)
+        found = {i: pair for name in first for i, pair in self.pairs_of(name) if (pair.b if pair.a == name else pair.a) in second}
+        return tuple(found[i] for i in sorted(found))
+
+    def padding_between(self, volumes: tuple[Volume, Volume]) -> float:
+        """Returns the largest padding of the pairs between two volumes, in metres: what keeps it is enough for each of them."""
+        if not self._own_paddings:
+            return self.padding
+        return max(map(self.padding_of, self.pairs_between(volumes)), default=self.padding)
+
     def polytope(self, C: ArrayLike, d: ArrayLike) -> Polytope:
         """Returns the polytope {C s <= d} with the joint limits added as its last 2n rows (upper, then lower)."""
         C, d = np.asarray(C, dtype=float).reshape(-1, self.n), np.asarray(d, dtype=float).reshape(-1)
@@ -272,12 +308,14 @@ class Scene(ConfigurationSpace):
         return hashlib.sha256(text.encode()).hexdigest()
 
     def _content(self) -> dict[str, Any]:
+        other = self.other_paddings()
         return {
             "schema_version": SCHEMA_VERSION,
             "joints": [_plain(joint) for joint in self.joints],
             "bodies": list(self.bodies),
             "geometries": [_plain(geometry) for geometry in self.geometries],
-            "pairs": [[p.a, p.b] for p in self.pairs],
+            # A pair without a padding of its own stands as before there were such, so that scenes keep their hash.
+            "pairs": [[p.a, p.b, other[p]] if p in other else [p.a, p.b] for p in self.pairs],
             "ignored": [{"pair": [i.a, i.b], "reason": i.reason} for i in self.ignored],
             "q_star": self.q_star.tolist(),
             "padding": self.padding,
@@ -330,7 +368,7 @@ def _read(document: Any) -> Scene:
         joints=tuple(_joint(joint) for joint in scene["joints"].items()),
         bodies=tuple(body.text() for body in scene["bodies"].items()),
         geometries=tuple(_geometry(geometry) for geometry in scene["geometries"].items()),
-        pairs=tuple(Pair(*_texts(pair)) for pair in scene["pairs"].items()),
+        pairs=tuple(_pair(pair) for pair in scene["pairs"].items()),
         ignored=tuple(_ignored(ignored) for ignored in scene["ignored"].items()),
         q_star=scene["q_star"].array(None),
         padding=float(scene["padding"].number()),
@@ -386,6 +424,13 @@ def _geometry(node: Node) -> Geometry:
         substitution=None if geometry["substitution"].value is None else geometry["substitution"].text(),
         inflation=float(geometry["inflation"].number()),
     )
+
+
+def _pair(node: Node) -> Pair:
+    if not isinstance(node.value, list) or len(node.value) != 3:
+        return Pair(*_texts(node))
+    a, b, padding = node.items()
+    return Pair(a.text(), b.text(), padding=float(padding.number()))
 
 
 def _ignored(node: Node) -> Ignored:
@@ -500,7 +545,7 @@ class Volume:
         geometries: names of the geometries.
         body: body in whose frame the vertices are. It is the geometries' own body, or their bodies are welded to it.
         vertices: (V, 3) metres.
-        radius: metres; the scene's padding is added to it.
+        radius: metres; the padding of the pairs is added to it.
     """
 
     geometries: tuple[str, ...]

@@ -29,7 +29,7 @@ class Scene(InSpace):
     not_covered: NotCovered
     """The pairs of geometries that no proof about the scene is about."""
     padding: float
-    """Metres added around every geometry of every pair."""
+    """Metres added around both geometries of every pair that has no padding of its own."""
     configurations: Mapping[str, Mapping[str, float]]
     """The named configurations: positions of joints by their names, in radians or metres."""
 

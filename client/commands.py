@@ -75,11 +75,18 @@ def scene_show(args: Namespace) -> int:
     output.print_table(("joint", "kind", "lower", "upper", "q*"), rows, right="lower upper q*")
     output.print_configurations(scene["configurations"])
     print()
-    rows = [
-        (f"{p['a']} - {p['b']}", p["frame"], f"{p['gram_a']}, {p['gram_b']}", f"{p['N_a']}, {p['N_b']}", output.seconds(p["seconds"]))
+    costs = [
+        (
+            f"{p['a']} - {p['b']}",
+            f"{1000 * p['padding']:.4g} mm",
+            p["frame"],
+            f"{p['gram_a']}, {p['gram_b']}",
+            f"{p['N_a']}, {p['N_b']}",
+            output.seconds(p["seconds"]),
+        )
         for p in pairs
     ]
-    output.print_table(("pair", "frame", "Gram", "N", "forecast"), rows, right="Gram N forecast")
+    output.print_table(("pair", "padding", "frame", "Gram", "N", "forecast"), costs, right="padding Gram N forecast")
     for item in lint["substitutions"]:
         print(f"{item['geometry']}: {item['substitution']} (reaches outside by at most {at_most_mm(item['inflation'])})")
     for item in lint["ignored"]:

@@ -12,13 +12,14 @@ import numpy as np
 from certifier.configurations import is_number
 from certifier.errors import CirisError
 from certifier.kinematics import Kinematics
-from certifier.model import Scene
+from certifier.model import Pair, Scene
 from certifier.pair.forecast import PairCost, forecast
 from certifier.scene.contacts import touching
 from certifier.scene.draft import Part, draft
 from certifier.scene.hollow import CONVEX_PARTS
 from certifier.scene.load import load_scene
 from certifier.seeding.limits import check_limits
+from certifier.verify.paddings import paddings
 from certifier.verify.uncovered import unlisted
 from client import output
 from client.inputs import numbers
@@ -128,8 +129,11 @@ def scene_check(args: Namespace) -> int:
         print(f"ignored: {ignored.a} and {ignored.b}: {ignored.reason}")
     if missing := unlisted(scene):
         print(f"no pairs, as neighbours or by a filter of the model: {missing}")
+    for line in paddings(scene) if scene.largest_padding else ():
+        print(line)
     for pair in bad:
-        print(f"touching at {whence}: {pair.a} and {pair.b}")
+        padded = f", with a padding of {scene.padding_of(pair):g} m on each" if scene.padding_of(pair) else ""
+        print(f"touching at {whence}: {pair.a} and {pair.b}{padded}")
     if not bad:
         print(f"nothing touches at {whence}")
     print(f"one plane for a pair: {output.seconds(sum(cost.seconds for cost in costs))} for all pairs on one core; most for")
@@ -179,5 +183,5 @@ def _document(scene: Scene, q: np.ndarray, bad: list[list[str]], costs: list[Pai
             {"geometry": g.name, "what": g.substitution, "inflation": g.inflation} for g in scene.geometries if g.substitution
         ],
         "ignored": [{"a": i.a, "b": i.b, "reason": i.reason} for i in scene.ignored],
-        "pairs": [{"a": cost.a, "b": cost.b, "seconds": cost.seconds} for cost in costs],
+        "pairs": [{"a": cost.a, "b": cost.b, "padding": scene.padding_of(Pair(cost.a, cost.b)), "seconds": cost.seconds} for cost in costs],
     }

@@ -135,7 +135,8 @@ def get_scene_pairs(scene_id: SceneGiven, db: Db) -> ScenePairs:
     pairs = []
     for index, cost in enumerate(forecast(scene)):
         chains = {"chain_a": [names[i] for i in cost.chain_a], "chain_b": [names[i] for i in cost.chain_b]}
-        pairs.append(PairForecast.model_validate({"index": index, **asdict(cost), **chains}))
+        padding = scene.padding_of(scene.pairs[index])
+        pairs.append(PairForecast.model_validate({"index": index, "padding": padding, **asdict(cost), **chains}))
     return ScenePairs(pairs=pairs)
 
 

@@ -57,7 +57,7 @@ class SceneModel(BaseModel):
     q_lower: list[float] = Field(description="(n,), lower limits.")
     q_upper: list[float] = Field(description="(n,), upper limits.")
     units: list[Unit] = Field(description="(n,), of each joint position.")
-    padding: float = Field(description="Metres that are added around every geometry of every pair.")
+    padding: float = Field(description="Metres added around both geometries of every pair that has no padding of its own.")
     geometries: list[DrawnGeometry] = Field(description="The convex bodies that are certified.")
     pairs: list[tuple[int, int]] = Field(description="Indices of the geometries of every pair to certify, in the order of the pairs.")
 

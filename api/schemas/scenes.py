@@ -89,7 +89,7 @@ class SceneDetail(SceneSummary):
 
     positions: list[JointInfo] = Field(description="The joints that have a position.")
     bodies: list[str] = Field(description="Names of the bodies.")
-    padding: float = Field(description="Metres added around every geometry of every pair.")
+    padding: float = Field(description="Metres added around both geometries of every pair that has no padding of its own.")
     not_covered: NotCovered = Field(description="The pairs of geometries that no proof about the scene is about.")
     configurations: dict[str, dict[str, float]] = Field(
         description="The named configurations: positions of joints by their names, in radians or metres. A request takes such names in the "
@@ -140,6 +140,7 @@ class PairForecast(PairInfo):
     Each side, `a` and `b`, has a chain of joints, a Gram matrix and a space of polynomials.
     """
 
+    padding: float = Field(description="Metres added around both geometries.")
     frame: str = Field(description="The body in whose frame the separating plane is expressed.")
     chain_a: list[str] = Field(description="Names of the joints between the frame and `a`.")
     chain_b: list[str] = Field(description="Names of the joints between the frame and `b`.")

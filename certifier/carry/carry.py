@@ -99,7 +99,7 @@ class _Taker:
 
     def taken(self, proof: Separation) -> Separation | None:
         """Returns the proof about the new scene; None where it covers none of its pairs."""
-        if self._old.padding != self._new.padding or proof.frame not in self._bodies:
+        if proof.frame not in self._bodies:
             return None
         coarse = proof.coarse if isinstance(proof, PartitionProof) else ((), ())
         sides = [self._side(volume, others) for volume, others in zip(proof.volumes, coarse, strict=True)]
@@ -109,7 +109,8 @@ class _Taker:
         about = replace(proof, scene=self._new, frame=self._bodies[proof.frame], volumes=(first[0], second[0]))
         if isinstance(about, PartitionProof):
             about = replace(about, coarse=(first[1], second[1]))
-        return about if about.pairs else None
+        same = self._new.padding_between(about.volumes) == self._old.padding_between(proof.volumes)
+        return about if about.pairs and same else None
 
     def _side(self, volume: Volume, coarse: Sequence[Volume]) -> tuple[Volume, tuple[Volume, ...]] | None:
         """Returns a volume and its coarse ones with the geometries of the new scene that all of them hold; None where they hold none."""

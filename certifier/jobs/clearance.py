@@ -111,11 +111,12 @@ def clearance(data: bytes, processes: int = 1, seed: int = 0) -> RegionClearance
         wanted = share * _proved_of(nearest.distance)
         if known >= wanted:
             break
-        padded = replace(scene, padding=scene.padding + wanted / 2)
+        padded = _padded(scene, wanted / 2)
         results = _certified(padded, proof, processes, seed)
         if all(result.outcome is Outcome.CERTIFIED for result in results):
             file = _assembled(padded, proof, results)
-            shown = 2 * (Fraction(padded.padding) - Fraction(scene.padding)) + Fraction(verify_region(file, processes).gap)
+            more = min(Fraction(padded.padding_of(pair)) - Fraction(scene.padding_of(pair)) for pair in scene.pairs)
+            shown = 2 * more + Fraction(verify_region(file, processes).gap)
             known = _rounded_down(shown)
             break
         witnesses = [result.witness_s for result in results if result.witness_s is not None]
@@ -135,6 +136,12 @@ def _proved_of(distance: float) -> float:
 def _rounded_down(value: Fraction) -> float:
     """Returns a double that is no larger."""
     return float(np.nextafter(float(value), -np.inf))
+
+
+def _padded(scene: Scene, more: float) -> Scene:
+    """Returns a scene with this much more padding around every geometry, in metres."""
+    pairs = [pair if pair.padding is None else replace(pair, padding=pair.padding + more) for pair in scene.pairs]
+    return replace(scene, padding=scene.padding + more, pairs=tuple(pairs))
 
 
 def _certified(scene: Scene, proof: RegionProof, processes: int, seed: int) -> list[PairResult]:
@@ -162,7 +169,7 @@ class _Distances:
         a, b = self._scene.geometry(pair.a), self._scene.geometry(pair.b)
         frame = self._kinematics.bodies_between(a.body, b.body)[0]
         A, B = (self._kinematics.points(frame, g.body, g.vertices, s) for g in (a, b))
-        reach, normal = a.radius + b.radius + 2 * self._scene.padding, np.empty(3)
+        reach, normal = a.radius + b.radius + 2 * self._scene.padding_of(pair), np.empty(3)
         return np.array([separation(A[i], B[i], normal) - reach for i in range(len(s))])
 
     def nearest(self, s: Array) -> Nearest:

@@ -107,7 +107,7 @@ class Reference:
             wrong = "is not available or not licensed" if solver in list(Solver) else "is unknown"
             raise CirisError("solver_unavailable", f"{solver} {wrong}", field="solver", hint=f"available: {', '.join(available())}")
         self.scene, self._solver, self._answers = scene, solver, _SOLVERS[Solver(solver)]
-        if scene.padding:
+        if any(map(scene.padding_of, scene.pairs)):
             raise SceneError("unsupported_padding", "Drake's programs have no padding", field="padding", hint="set it to 0")
         start = time.process_time()
         self._diagram = diagram = build_diagram(scene)

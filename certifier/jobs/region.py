@@ -107,6 +107,7 @@ def certified_region(
             {
                 "a": p.a,
                 "b": p.b,
+                "padding": scene.padding_of(p),
                 "outcome": "certified",
                 "proved_distance": statement.gaps[p],
                 "margin": statement.gaps[p],

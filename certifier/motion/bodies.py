@@ -82,7 +82,7 @@ def bodies_of(scene: Scene) -> Bodies:
         centers=np.array(centers).reshape(-1, 3),
         sizes=np.array(sizes),
         pairs=np.array([(number[pair.a], number[pair.b]) for pair in scene.pairs], dtype=np.int64).reshape(-1, 2),
-        reaches=np.array([sum(scene.geometry(name).radius for name in (pair.a, pair.b)) + 2 * scene.padding for pair in scene.pairs]),
+        reaches=np.array([sum(scene.geometry(name).radius for name in (p.a, p.b)) + 2 * scene.padding_of(p) for p in scene.pairs]),
     )
 
 

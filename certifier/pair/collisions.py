@@ -23,9 +23,9 @@ def in_collision(scene: Scene, s: Array, room: float = 0.0) -> NDArray[np.bool_]
         room: metres by which the padded bodies have to be apart.
     """
     collides = np.zeros(len(s), dtype=bool)
-    for _, (a, b), R, p in _poses(scene, s):
+    for index, (a, b), R, p in _poses(scene, s):
         left = np.flatnonzero(~collides)
-        collides[left[_touching(a, b, R[left], p[left], 2 * scene.padding + room)]] = True
+        collides[left[_touching(a, b, R[left], p[left], 2 * scene.padding_of(scene.pairs[index]) + room)]] = True
     return collides
 
 
@@ -33,7 +33,7 @@ def contacts(scene: Scene, s: Array) -> list[list[int]]:
     """Returns for each of the points s, (N, n), the indices of the pairs that are not shown to be apart there, ascending."""
     found: list[list[int]] = [[] for _ in s]
     for index, (a, b), R, p in _poses(scene, s):
-        for point in _touching(a, b, R, p, 2 * scene.padding).tolist():
+        for point in _touching(a, b, R, p, 2 * scene.padding_of(scene.pairs[index])).tolist():
             found[point].append(index)
     return [sorted(pairs) for pairs in found]
 
@@ -63,7 +63,7 @@ def touching(kinematics: Kinematics, volumes: tuple[Volume, Volume], s: Array) -
     a, b = volumes
     X = kinematics.numerators(a.body, b.body, s)
     R, p = X[:, :3, :3] / X[:, 3, 3, None, None], X[:, :3, 3] / X[:, 3, 3, None]
-    return np.isin(np.arange(len(s)), _touching(a, b, R, p, 2 * kinematics.scene.padding))
+    return np.isin(np.arange(len(s)), _touching(a, b, R, p, 2 * kinematics.scene.padding_between(volumes)))
 
 
 def _touching(a: Geometry | Volume, b: Geometry | Volume, R: Array, p: Array, padding: float) -> NDArray[np.int64]:

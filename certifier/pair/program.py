@@ -143,7 +143,7 @@ def build(sides: Sides, volumes: tuple[Volume, Volume], frame: Frame) -> list[Bl
     """
     scene, joints, j = sides.kinematics.scene, list(sides.joints), len(sides.joints)
     a, b = volumes
-    radii = [volume.radius + scene.padding for volume in volumes]
+    radii = [volume.radius + scene.padding_between(volumes) for volume in volumes]
     rounded = max(radii) > 0
     columns = _columns(j, rounded)
     blocks = []

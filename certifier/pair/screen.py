@@ -45,7 +45,6 @@ class Screen:
 
     def __init__(self, kinematics: Kinematics, polytope: Polytope, center: Array, samples: Array) -> None:
         self._kinematics, self._polytope = kinematics, polytope
-        self._padding = kinematics.scene.padding
         self.configurations = np.concatenate([center[None], samples])
         self._first = self.configurations[:SCREEN_SAMPLES]
         if kinematics.scene.n <= NEAREST_JOINTS:
@@ -64,14 +63,16 @@ class Screen:
         """Returns whether, at each of a few samples, the padded volumes' distance is large against what they sweep in the frame."""
         A, B = (self._points(volume, frame, self.configurations[:GAP_SAMPLES]) for volume in volumes)
         least = APART * sum(float(np.linalg.norm(np.ptp(points, axis=0), axis=1).max()) for points in (A, B))
-        least += sum(volume.radius for volume in volumes) + 2 * self._padding
+        least += self._reach(volumes)
         return first_within(A, B, least) is None
 
     def _contact(self, volumes: tuple[Volume, Volume], frame: Frame, s: Array) -> Contact | None:
         a, b = volumes
-        reach = a.radius + b.radius + 2 * self._padding
-        found = first_within(self._points(a, frame, s), self._points(b, frame, s), reach)
+        found = first_within(self._points(a, frame, s), self._points(b, frame, s), self._reach(volumes))
         return None if found is None else Contact(s[found[0]], found[1].weights)
+
+    def _reach(self, volumes: tuple[Volume, Volume]) -> float:
+        return sum(volume.radius for volume in volumes) + 2 * self._kinematics.scene.padding_between(volumes)
 
     def _points(self, volume: Volume, frame: Frame, s: Array) -> Array:
         return self._kinematics.points(frame.body, volume.body, volume.vertices, s)

@@ -84,7 +84,7 @@ class Bodies:
 
     def __init__(self, area: Area, frame: str, volumes: tuple[Volume, Volume]) -> None:
         self._area, self.volumes = area, volumes
-        self._radii = [volume.radius + area.scene.padding for volume in volumes]
+        self._radii = [volume.radius + area.scene.padding_between(volumes) for volume in volumes]
         # A joint between the frame and both bodies moves neither against the other, but stays in the plane's frame.
         self.joints = sorted({joint for volume in volumes for joint in area.kinematics.chain(frame, volume.body)})
         self._sides = [

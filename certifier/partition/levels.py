@@ -8,7 +8,6 @@ it (certifier.partition.shared). Where the balls come too close, a cell goes on 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -92,8 +91,9 @@ def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> Levels:
     return Levels((first, second), levels + fats[::-1], len(levels), two_chains)
 
 
-def _room(area: Area, frame: str, volumes: Sequence[Volume]) -> Array:
+def _room(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> Array:
     """Returns how far apart the volumes are at each share in APART of the configurations, in metres; not positive if they touch."""
-    hulls = [hull(area.kinematics, frame, v, v.radius + area.scene.padding, np.zeros(3), 1.0) for v in volumes]
+    padding = area.scene.padding_between(volumes)
+    hulls = [hull(area.kinematics, frame, v, v.radius + padding, np.zeros(3), 1.0) for v in volumes]
     room: Array = np.quantile(gaps(*hulls, area.samples[:LOOKED]), [1 - share for share in APART])
     return room

@@ -37,8 +37,9 @@ class Shared:
         self._tried: LRUCache[bytes, Tried] = LRUCache(MOST)
 
     def bodies(self, frame: str, volumes: tuple[Volume, Volume]) -> Bodies:
-        """Returns two volumes as bodies, the same ones for volumes of the same shape, whatever geometries they stand for."""
-        key = frame, *((volume.body, volume.vertices.tobytes(), volume.radius) for volume in volumes)
+        """Returns two volumes as bodies, the same ones for volumes of one shape and padding, whatever geometries they stand for."""
+        shapes = ((volume.body, volume.vertices.tobytes(), volume.radius) for volume in volumes)
+        key = frame, self._area.scene.padding_between(volumes), *shapes
         if key not in self._bodies:
             self._bodies[key] = Bodies(self._area, frame, volumes)
         return self._bodies[key]

@@ -97,7 +97,8 @@ def _joined(
     known = sorted(index for index in asked if index is not None)
     if not known:
         return []
-    if len(known) == len(asked) and _will_do(scene, first, second, samples, keep):
+    same_padding = len({scene.padding_of(scene.pairs[index]) for index in known}) == 1
+    if same_padding and len(known) == len(asked) and _will_do(scene, first, second, samples, keep):
         return [known]
     larger, other = (first, second) if len(first) >= len(second) else (second, first)
     return [members for half in _halves(larger) for members in _joined(scene, half, other, numbers, samples, keep)]
@@ -129,6 +130,7 @@ def _will_do(scene: Scene, first: list[Geometry], second: list[Geometry], sample
 def _gaps(scene: Scene, one: Volume, other: Volume, X: Array) -> Array:
     """Returns how far two volumes are apart at configurations, (N,), in metres, padding subtracted; not positive where they touch."""
     kinematics = Kinematics.of(scene)
-    bodies = [hull(kinematics, one.body, v, v.radius + scene.padding, np.zeros(3), 1.0) for v in (one, other)]
+    padding = scene.padding_between((one, other))
+    bodies = [hull(kinematics, one.body, v, v.radius + padding, np.zeros(3), 1.0) for v in (one, other)]
     found: Array = gaps(*bodies, X)
     return found

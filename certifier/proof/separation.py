@@ -60,9 +60,7 @@ class Separation:
     @property
     def pairs(self) -> tuple[Pair, ...]:
         """Returns the pairs of the scene that the proof covers, in the scene's order."""
-        first, second = (set(volume.geometries) for volume in self.volumes)
-        found = {i: p for name in first for i, p in self.scene.pairs_of(name) if (p.b if p.a == name else p.a) in second}
-        return tuple(found[i] for i in sorted(found))
+        return self.scene.pairs_between(self.volumes)
 
     @property
     def title(self) -> str:

@@ -18,8 +18,8 @@ _INSTANCE = "scene"
 def build_diagram(scene: Scene) -> RobotDiagram:
     """Returns the scene as a Drake diagram, with the same joint positions in the same order. Only ``scene.pairs`` can collide in it.
 
-    The geometries are the scene's conv(vertices) + ball(radius), without ``scene.padding``. So a configuration is free when the signed
-    distance of every pair is more than twice the padding. Drake's names of bodies, joints and geometries are :func:`drake_name`, and
+    The geometries are the scene's conv(vertices) + ball(radius), without padding. So a configuration is free when the signed distance of
+    every pair is more than twice its padding. Drake's names of bodies, joints and geometries are :func:`drake_name`, and
     :func:`scene_name` and :func:`geometry_name` lead back.
 
     Raises:

@@ -21,6 +21,7 @@ from certifier.names import ALPHABET, MAX_SENTENCE, is_name, is_sentence
 from certifier.positions import MAGNITUDE
 from certifier.scene.directives import added_files, check_directives, replaced, resolved
 from certifier.scene.nodes import MEND, compose, decoded
+from certifier.scene.paddings import PaddedPair, Paddings
 from certifier.scene.paths import beside
 
 KEYS = (
@@ -29,6 +30,8 @@ KEYS = (
     "xacro",
 )
 """The keys of a scene file."""
+SWEPT = "swept"
+"""The word for a joint in ``fix`` that is not held at a position."""
 MAX_BYTES = 2**20
 MIN_HULL_VERTICES = 8
 MAX_VERTICES, MAX_SIDES = 512, 128
@@ -58,7 +61,9 @@ class SceneFile:
         q_star: (n,) centre of the parametrisation, radians or metres; None for the middle of the joint limits.
         limits: narrower limits by joint, radians or metres.
         fix: positions by joint, radians or metres, at which joints are held.
-        padding: metres that are added around every geometry.
+        swept: joints of which everything behind them counts at all positions.
+        padding: metres that are added around both geometries of every pair that ``paddings`` does not concern.
+        paddings: what the file says of the padding of bodies and of pairs.
         ignore: the pairs that are not certified.
         hulls: the bodies that one hull of all their polytopes stands for.
         max_vertices: greatest number of vertices that stand for a mesh or an ellipsoid.
@@ -77,7 +82,9 @@ class SceneFile:
     q_star: tuple[float, ...] | None = None
     limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     fix: dict[str, float] = field(default_factory=dict)
+    swept: tuple[str, ...] = ()
     padding: float = 0.0
+    paddings: Paddings = field(default_factory=Paddings)
     ignore: tuple[IgnoreEntry, ...] = field(default=())
     hulls: tuple[str, ...] = ()
     max_vertices: int = 32
@@ -85,6 +92,11 @@ class SceneFile:
     xacro: dict[str, str | int | float | bool] = field(default_factory=dict)
     srdf: dict[str, str] = field(default_factory=dict)
     configurations: dict[str, dict[str, float] | tuple[float, ...]] = field(default_factory=dict)
+
+    @property
+    def largest_padding(self) -> float:
+        """Returns the largest padding that the file gives, in metres."""
+        return max(self.padding, *self.paddings.bodies.values(), *(pair.padding for pair in self.paddings.pairs), 0.0)
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -103,10 +115,12 @@ def read_scene_file(path: Path) -> SceneFile:
     nodes = _mapping(root, path.name)
     if "directives" not in nodes:
         raise _wrong("directives", "is missing", hint="a list of Drake Model Directives that adds the robot and its surroundings")
-    values = {key: _construct(node, key) for key, node in nodes.items() if key != "directives"}
+    values: dict[str, Any] = {key: _construct(node, key) for key, node in nodes.items() if key != "directives"}
     mesh = _section(values.get("mesh", {}), "mesh", ("mode", "max_vertices"))
     if mesh.get("mode", "hull") != "hull":
         raise _wrong("mesh.mode", f"must be hull, not {mesh['mode']!r}")
+    fix = _by_joint(values.get("fix", {}), "fix")
+    padding, paddings = _padding(values.get("padding", 0.0))
     directives = nodes["directives"]
     _check_directives(directives, path.name)
     return SceneFile(
@@ -118,8 +132,10 @@ def read_scene_file(path: Path) -> SceneFile:
         models=tuple(added.file for added in added_files(directives)),
         q_star=_q_star(values.get("q_star")),
         limits=_limits(values.get("limits", {})),
-        fix={name: _number(value, f"fix.{name}") for name, value in _by_joint(values.get("fix", {}), "fix").items()},
-        padding=_number(values.get("padding", 0.0), "padding", minimum=0.0),
+        fix={name: _position(value, f"fix.{name}") for name, value in fix.items() if value != SWEPT},
+        swept=tuple(name for name, value in fix.items() if value == SWEPT),
+        padding=padding,
+        paddings=paddings,
         ignore=_ignore(values.get("ignore", [])),
         hulls=_hulls(values.get("hulls", [])),
         max_vertices=_integer(mesh.get("max_vertices", 32), "mesh.max_vertices", minimum=MIN_HULL_VERTICES, maximum=MAX_VERTICES),
@@ -308,6 +324,12 @@ def _by_joint(value: Any, where: str) -> dict[str, Any]:
     return {_name(name, where): content for name, content in value.items()}
 
 
+def _position(value: Any, where: str) -> float:
+    if isinstance(value, str):
+        raise _wrong(where, f"must be a position, in radians or metres, or the word {SWEPT}, not {value!r}")
+    return _number(value, where)
+
+
 def _limits(value: Any) -> dict[str, tuple[float, float]]:
     found = {}
     for name, limits in _by_joint(value, "limits").items():
@@ -319,6 +341,30 @@ def _limits(value: Any) -> dict[str, tuple[float, float]]:
             raise _wrong(where, f"must have an interior: {lower:g} is not less than {upper:g}", hint="hold a joint by fix")
         found[name] = (lower, upper)
     return found
+
+
+def _padding(value: Any) -> tuple[float, Paddings]:
+    """Returns the padding of all pairs, and that of bodies and pairs that have another one."""
+    if not isinstance(value, dict):
+        return _number(value, "padding", minimum=0.0), Paddings()
+    _known(value, "padding", ("default", "bodies", "pairs"))
+    bodies, pairs = value.get("bodies", {}), value.get("pairs", [])
+    if not isinstance(bodies, dict):
+        raise _wrong("padding.bodies", "must map names of bodies or geometries to metres")
+    if not isinstance(pairs, list):
+        raise _wrong("padding.pairs", "must be a list of {pair: [a, b], padding: metres}")
+    found = {_string(name, "padding.bodies"): _number(x, f"padding.bodies.{name}", minimum=0.0) for name, x in bodies.items()}
+    entries = tuple(_padded_pair(entry, f"padding.pairs[{i}]") for i, entry in enumerate(pairs))
+    return _number(value.get("default", 0.0), "padding.default", minimum=0.0), Paddings(found, entries)
+
+
+def _padded_pair(value: Any, where: str) -> PaddedPair:
+    entry = _section(value, where, ("pair", "padding"))
+    pair = entry.get("pair")
+    if not isinstance(pair, list) or len(pair) != 2:
+        raise _wrong(f"{where}.pair", "must be two names, [a, b]")
+    a, b = (_string(name, f"{where}.pair[{k}]") for k, name in enumerate(pair))
+    return PaddedPair(a, b, _number(entry.get("padding"), f"{where}.padding", minimum=0.0), f"{where}.pair")
 
 
 def _ignore(value: Any) -> tuple[IgnoreEntry, ...]:

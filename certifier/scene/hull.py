@@ -59,7 +59,7 @@ def outer(points: Array, max_vertices: int) -> tuple[Array, float, int]:
     extreme = hull_vertices(points)
     if len(extreme) <= max_vertices and _is_hull(extreme, points):
         return extreme, 0.0, len(extreme)
-    solid = hull_vertices(_thickened(extreme))
+    solid = hull_vertices(thickened(extreme))
     center = solid.mean(axis=0)
     solid = solid - center
     with contextlib.suppress(QhullError):  # a needle far from the origin is flat to Qhull, thickened or not
@@ -109,7 +109,7 @@ def _depths(vertices: Array, points: Array) -> Array:
     return depths if middle > 0 else np.minimum(depths, middle)
 
 
-def _thickened(points: Array) -> Array:
+def thickened(points: Array) -> Array:
     """Returns the points, or two copies of them, one on either side of their plane, when they are flat."""
     axes = np.linalg.svd(points - points.mean(axis=0))[2]
     extent = np.ptp(points @ axes.T, axis=0)

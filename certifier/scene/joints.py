@@ -6,7 +6,7 @@ the same pose a turn later, so seeds and questions are taken to the window (:met
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -46,8 +46,13 @@ def counted(limit: float) -> float:
     return float(np.copysign(np.inf, limit)) if abs(limit) >= UNBOUNDED else limit
 
 
-def held_at(joints: Sequence[Joint], positions: Mapping[str, float], couplings: Sequence[Coupling]) -> dict[str, float]:
+def held_at(
+    joints: Sequence[Joint], positions: Mapping[str, float], couplings: Sequence[Coupling], swept: Collection[str] = ()
+) -> dict[str, float]:
     """Returns where joints are held, radians or metres, by their full names. A joint that is coupled to held ones alone is held as well.
+
+    Args:
+        swept: full names of joints that are swept.
 
     Raises:
         SceneError: ``unknown_name``; ``scene_field`` where a joint cannot be there; ``unsupported_joint`` where coupled joints are free.
@@ -55,8 +60,11 @@ def held_at(joints: Sequence[Joint], positions: Mapping[str, float], couplings: 
     by_name = {j.name: j for j in joints if j.index is not None}
     at = by_full_name(positions, by_name, "fix")
     for name, value in at.items():
+        if name in swept:
+            message = f"joint {name} follows one that is swept, so it cannot be held"
+            raise SceneError("scene_field", message, field=f"fix.{name}", hint="leave it out of fix")
         _check_within(by_name[name], value)
-    _follow(at, by_name, couplings)
+    _follow(at, by_name, [coupling for coupling in couplings if not swept or not {*coupling.factors} <= {*swept}])
     return at
 
 
@@ -77,7 +85,7 @@ def narrowed(joints: Sequence[Joint], limits: Mapping[str, tuple[float, float]])
     by_name = {j.name: j for j in joints if j.index is not None}
     given = by_full_name(limits, by_name, "limits")
     for name, (lower, upper) in given.items():
-        own_lower, own_upper = _range(by_name[name])
+        own_lower, own_upper = range_of(by_name[name])
         if lower < own_lower - EXACT or upper > own_upper + EXACT:
             message = f"{lower:g} to {upper:g} is not within the joint's own limits, {own_lower:g} to {own_upper:g}"
             raise SceneError("scene_field", message, field=f"limits.{name}", hint="scene files can only make limits narrower")
@@ -106,14 +114,15 @@ def centered(joints: Sequence[Joint], q_star: Sequence[float] | None) -> tuple[l
     return [found.get(j.name, j) for j in joints], np.array(centers)
 
 
-def _range(joint: Joint) -> tuple[float, float]:
+def range_of(joint: Joint) -> tuple[float, float]:
+    """Returns the limits of a joint that moves, which may be infinite."""
     assert joint.lower is not None, "a joint that moves has limits, which may be infinite"
     assert joint.upper is not None
     return joint.lower, joint.upper
 
 
 def _middle(joint: Joint) -> float:
-    lower, upper = _range(joint)
+    lower, upper = range_of(joint)
     if np.isfinite(lower) and np.isfinite(upper):
         return (lower + upper) / 2
     return float(np.clip(0.0, lower, upper))
@@ -121,7 +130,7 @@ def _middle(joint: Joint) -> float:
 
 def _windowed(joint: Joint, center: float) -> Joint:
     """Returns a joint with a window where its limits reach half a turn from the centre, or nearly."""
-    lower, upper = _range(joint)
+    lower, upper = range_of(joint)
     if lower >= upper:
         message = f"joint {joint.name} cannot move: its limits are {lower:g} and {upper:g}"
         raise SceneError("joint_range", message, field="directives", hint=f"hold it by fix: {{{joint.name}: {lower:g}}}")
@@ -166,7 +175,7 @@ def _known(name: str, joints: Mapping[str, Joint], field: str) -> str:
 
 
 def _check_within(joint: Joint, value: float) -> None:
-    lower, upper = _range(joint)
+    lower, upper = range_of(joint)
     if not lower - EXACT <= value <= upper + EXACT:
         message = f"{value:g} is not within the joint's limits, {lower:g} to {upper:g}"
         raise SceneError("scene_field", message, field=f"fix.{joint.name}", hint="hold it within them")
@@ -179,7 +188,8 @@ def _follow(at: dict[str, float], by_name: Mapping[str, Joint], couplings: Seque
         known = next((c for c in waiting if sum(name not in at for name in c.factors) <= 1), None)
         if known is None:
             names = " and ".join(waiting[0].factors)
-            hint = f"hold one of them, as in fix: {{{next(iter(waiting[0].factors))}: 0}}; the other follows"
+            first = next(iter(waiting[0].factors))
+            hint = f"hold one of them, as in fix: {{{first}: 0}}, or sweep it, as in fix: {{{first}: swept}}; the other follows"
             raise SceneError("unsupported_joint", f"joints {names} are coupled (mimic), and none is held", field="directives", hint=hint)
         waiting.remove(known)
         rest = known.constant - sum(factor * at[name] for name, factor in known.factors.items() if name in at)

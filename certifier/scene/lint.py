@@ -122,14 +122,17 @@ def _steep(scene: Scene) -> list[str]:
 
 
 def _always_touching(scene: Scene) -> list[str]:
-    """Returns findings about pairs that overlap at every configuration tried: no region can be certified for them."""
+    """Returns findings about pairs that touch at every configuration tried: no region can be certified for them."""
     always = set(scene.pairs)
     for found in touching(scene, _tried(scene, _SAMPLES)):
         always &= found
         if not always:
             break
+    mend = "in every configuration tried: mend the geometry, or ignore the pair with a reason"
     return [
-        f"{p.a} and {p.b} overlap in every configuration tried: mend the geometry, or ignore the pair with a reason"
+        f"{p.a} and {p.b} are nearer than a padding of {scene.padding_of(p):g} m on each {mend}, or give it less padding"
+        if scene.padding_of(p)
+        else f"{p.a} and {p.b} overlap {mend}"
         for p in sorted(always, key=lambda p: (p.a, p.b))
     ]
 

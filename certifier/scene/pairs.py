@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from certifier.errors import SceneError, close_matches
-from certifier.model import WORLD, Geometry, Ignored, Pair
+from certifier.model import Geometry, Ignored, Pair
 from certifier.scene.file import IgnoreEntry
+from certifier.scene.paddings import check_known
 from certifier.scene.tree import Tree
 
 
@@ -30,12 +30,10 @@ def pairs(
         SceneError: an ignore entry names neither a body nor a geometry.
     """
     body = {g.name: g.body for g in geometries}
-    known = [name for name in tree.bodies if name != WORLD] + list(body)
+    known = [*tree.bodies, *body]
     for entry in ignore:
         for k, name in enumerate((entry.a, entry.b)):
-            if name != WORLD and name not in known:
-                message, hint = f"{name!r} is neither a body nor a geometry of the scene", "`ciris scene show` and `scene check` list them"
-                raise SceneError("unknown_name", message, field=f"{entry.field}[{k}]", hint=close_matches(name, known) or hint)
+            check_known(name, known, f"{entry.field}[{k}]")
     entries = (*ignore, *described)
     first = {frozenset((entry.a, entry.b)): entry for entry in reversed(entries)}
     place = {entry: i for i, entry in enumerate(entries)}

@@ -59,6 +59,7 @@ from certifier.scene.names import Names
 from certifier.scene.pairs import pairs
 from certifier.scene.semantics import read_semantics
 from certifier.scene.strict import StrictReader
+from certifier.scene.sweep import Sweeper, others_of, said_of, sweeps_of
 from certifier.scene.tree import Tree, floating
 
 _IGNORED_SHAPE = re.compile(r"geom \S+ specified unknown mesh|The geom type|The fromto tag")
@@ -98,11 +99,15 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     names = Names(plant, inspector)
     warnings += without_limits(strict, plant, names)
     every = [joint_of(plant.get_joint(index), names) for index in plant.GetJointIndices()]
-    at = held_at(every, scene_file.fix, couplings(plant, names))
-    joints, q_star = centered(narrowed(held(every, at), scene_file.limits), scene_file.q_star)
+    coupled = couplings(plant, names)
+    sweeps = sweeps_of(every, scene_file.swept, scene_file.limits, coupled)
+    at = held_at(every, scene_file.fix, coupled, sweeps)
+    welded = at | {name: sweep.middle for name, sweep in sweeps.items()}
+    limits = others_of(scene_file.limits, sweeps, every)
+    joints, q_star = centered(narrowed(held(every, welded), limits), scene_file.q_star)
     tree = Tree(joints, list(names.bodies))
     reached: dict[str, float] = {}
-    parts = _geometries(scene_file, strict, copies, plant, inspector, tree, names, reached)
+    parts = _geometries(scene_file, strict, copies, plant, inspector, tree, Sweeper(tree, sweeps, scene_file.max_vertices), names, reached)
     by_id = with_hulls(parts, scene_file.hulls, tree.bodies, scene_file.max_vertices, names.register, reached)
     candidates = list(dict.fromkeys((by_id[a].name, by_id[b].name) for a, b in inspector.GetCollisionCandidates()))
     geometries = tuple({id(geometry): geometry for geometry in by_id.values()}.values())
@@ -111,12 +116,13 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     semantics = read_semantics(scene_file, tree.bodies)
     described = [entry for one in semantics for entry in one.ignore]
     wanted, ignored, unused = pairs(candidates, geometries, tree, scene_file.ignore, described)
+    padded, without = scene_file.paddings.on(wanted, geometries, tree.bodies)
     scene = Scene(
         name=scene_file.name,
         joints=tree.joints,
         bodies=tree.bodies,
         geometries=geometries,
-        pairs=wanted,
+        pairs=padded,
         ignored=ignored,
         q_star=q_star,
         padding=scene_file.padding,
@@ -132,7 +138,7 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     states, left_out = srdf_configurations(scene, semantics, at)
     files = {entry.reason: one.file for one in semantics for entry in one.ignore}
     document = replace(scene, configurations=states | own_configurations(scene, scene_file.configurations)).to_document()
-    document["warnings"] = warnings + unused + left_out + findings(scene, tree, candidates, drawn, files)
+    document["warnings"] = warnings + said_of(sweeps) + unused + without + left_out + findings(scene, tree, candidates, drawn, files)
     return document
 
 
@@ -285,6 +291,7 @@ def _geometries(
     plant: MultibodyPlant,
     inspector: SceneGraphInspector,
     tree: Tree,
+    sweeper: Sweeper,
     names: Names,
     reached: dict[str, float],
 ) -> dict[GeometryId, Geometry]:
@@ -302,14 +309,15 @@ def _geometries(
         else:
             X_BG = inspector.GetPoseInFrame(i)
             convex = _convex(inspector.GetShape(i), name, scene_file, strict, copies)
-            found[i] = _placed(name, body_name, convex, X_BG)
+            found[i] = sweeper.around(_placed(name, body_name, convex, X_BG))
             if convex.beyond:
                 reached[name] = convex.beyond
-    reach = tree.reach(list(found.values()), scene_file.padding)
+    reach = tree.reach(list(found.values()), scene_file.largest_padding)
     for i, name, body_name in half_spaces:
         if body_name not in tree.anchored:
             message = f"geometry {name} is a half-space on a body that moves"
             raise SceneError("unsupported_shape", message, field="directives", hint="use a box")
+        sweeper.check_half_space(name, body_name)
         X_BG = inspector.GetPoseInFrame(i)
         center = (RigidTransform(tree.anchored[body_name]) @ X_BG).inverse().translation()
         found[i] = _placed(name, body_name, shapes.half_space(center, reach), X_BG)

@@ -70,7 +70,7 @@ def _outward(joints: list[Joint], bodies: list[str]) -> list[Joint]:
         body = open_ends.pop(0)
         for j in [j for j in rest if body in (j.parent, j.child)]:
             rest.remove(j)
-            j = j if j.parent == body else _turned(j)
+            j = j if j.parent == body else turned(j)
             if j.child in reached:
                 message = f"joint {j.name} closes a loop of joints"
                 raise SceneError("loop", message, field="directives", hint="remove a joint of the loop; only trees are supported")
@@ -94,7 +94,8 @@ def floating(body: str) -> SceneError:
     return SceneError("floating_body", f"body {body} is not attached to anything", field="directives", hint=hint)
 
 
-def _turned(j: Joint) -> Joint:
+def turned(j: Joint) -> Joint:
+    """Returns the joint with parent and child exchanged, at the same positions."""
     if j.kind is JointKind.WELD:
         X = np.linalg.inv(j.X_PF @ np.linalg.inv(j.X_BM))
         return Joint(j.name, j.kind, j.child, j.parent, j.axis, X, np.eye(4))

@@ -36,7 +36,7 @@ class Shape:
 
 
 CoarsePairs = dict[tuple[Shape, Shape], tuple[Volume, Volume]]
-"""The shapes of two volumes that faces keep apart -> the volumes."""
+"""The shapes of two volumes that faces keep apart -> the volumes, those of the pair with the largest padding."""
 
 
 def coarse_pairs_of(scene: Scene, polytope: Polytope, points: Array) -> CoarsePairs:
@@ -60,7 +60,9 @@ def coarse_pairs_of(scene: Scene, polytope: Polytope, points: Array) -> CoarsePa
         room = ROOM * max(volume.radius for volume in bodies.volumes)
         if (bodies.extent * gaps(*bodies.hulls, points) > room).all():
             first, second = (Shape(volume.body, volume.vertices.tobytes(), volume.radius) for volume in bodies.volumes)
-            found[first, second] = bodies.volumes
+            known = found.get((first, second))
+            if known is None or scene.padding_between(known) < scene.padding_between(bodies.volumes):
+                found[first, second] = bodies.volumes
     return found
 
 
@@ -80,5 +82,5 @@ def with_coarse_pairs(scene: Scene, coarse: CoarsePairs) -> Scene:
                     corners = corners[:1]
                 new[key] = Geometry(f"//{len(new)}", volume.body, corners, volume.radius, {})
             names.append(new[key].name)
-        pairs.append(Pair(*sorted(names)))
+        pairs.append(Pair(*sorted(names), padding=scene.padding_between(volumes)))
     return replace(scene, geometries=(*scene.geometries, *new.values()), pairs=(*scene.pairs, *pairs))

@@ -128,6 +128,9 @@ def checker(scene: Scene) -> SceneGraphCollisionChecker:
     )
     checker.SetPaddingAllRobotEnvironmentPairs(2 * scene.padding)
     checker.SetPaddingAllRobotRobotPairs(2 * scene.padding)
+    for pair, padding in scene.other_paddings().items():
+        one, other = (diagram.plant().GetBodyByName(drake_name(_own_body(name))).index() for name in (pair.a, pair.b))
+        checker.SetPaddingBetween(one, other, 2 * padding)
     return checker
 
 
@@ -137,7 +140,7 @@ def _apart(scene: Scene) -> Scene:
     Drake's checker knows collision filters between bodies only. Drake's rational kinematics numbers s by bodies, not by positions.
     """
     eye = np.eye(4)
-    welds = tuple(Joint(f"{g.name}/weld", JointKind.WELD, g.body, f"{g.name}/body", np.zeros(3), eye, eye) for g in scene.geometries)
+    welds = tuple(Joint(f"{g.name}/weld", JointKind.WELD, g.body, _own_body(g.name), np.zeros(3), eye, eye) for g in scene.geometries)
     moving = tuple(joint.child for joint in scene.moving)
     return replace(
         scene,
@@ -145,6 +148,10 @@ def _apart(scene: Scene) -> Scene:
         bodies=tuple(body for body in scene.bodies if body not in moving) + moving + tuple(weld.child for weld in welds),
         geometries=tuple(replace(g, body=weld.child) for g, weld in zip(scene.geometries, welds, strict=True)),
     )
+
+
+def _own_body(geometry: str) -> str:
+    return f"{geometry}/body"
 
 
 class _Recorder(logging.Handler):

@@ -27,32 +27,33 @@ class Clearance:
         self._scene = scene
         self._diagram = build_diagram(scene)
         self._context = self._diagram.CreateDefaultContext()
+        inspector = self._diagram.scene_graph().model_inspector()
+        self._ids = {geometry_name(inspector, g): g for g in inspector.GetAllGeometryIds()}
+        self._reaches = {frozenset((self._ids[p.a], self._ids[p.b])): 2 * scene.padding_of(p) for p in scene.pairs}
 
     def least(self, q: Array) -> tuple[float, Pair]:
-        """Returns the least distance of a pair at q, (n,), without the padding, in metres, and the pair.
+        """Returns the least distance of the padded bodies of a pair at q, (n,), in metres, and the pair.
 
         It is minus infinity where Drake cannot tell how deep two bodies are in each other.
         """
-        query = self._query(q)
-        ids = {geometry_name(query.inspector(), g): g for g in query.inspector().GetAllGeometryIds()}
+        query, ids = self._query(q), self._ids
         least, nearest = np.inf, self._scene.pairs[0]
         for pair in self._scene.pairs:
             try:
-                distance = query.ComputeSignedDistancePairClosestPoints(ids[pair.a], ids[pair.b]).distance
+                apart = query.ComputeSignedDistancePairClosestPoints(ids[pair.a], ids[pair.b]).distance
             except RuntimeError:  # Drake gives up on some bodies that are deep in each other.
                 return -np.inf, pair
-            if distance < least:
+            if (distance := apart - 2 * self._scene.padding_of(pair)) < least:
                 least, nearest = distance, pair
         return float(least), nearest
 
     def free(self, q: Array, room: float = 0.0) -> bool:
         """Returns whether all pairs are farther apart at q, (n,), than twice the padding and the room, in metres."""
-        least = 2 * self._scene.padding + room
         try:
-            near = self._query(q).ComputeSignedDistancePairwiseClosestPoints(least)
+            near = self._query(q).ComputeSignedDistancePairwiseClosestPoints(2 * self._scene.largest_padding + room)
         except RuntimeError:  # as above
             return False
-        return all(pair.distance > least for pair in near)
+        return all(pair.distance > self._reaches[frozenset((pair.id_A, pair.id_B))] + room for pair in near)
 
     def _query(self, q: Array) -> QueryObject:
         self._diagram.plant().SetPositions(self._diagram.mutable_plant_context(self._context), q)
@@ -94,10 +95,12 @@ def check_free(scene: Scene, q: Array, field: str) -> Nearest:
         return Nearest(q, field, np.inf, None)
     clearance = Clearance(scene)
     distance, pair = clearance.least(q)
-    if distance > 2 * scene.padding:
-        return Nearest(q, field, distance - 2 * scene.padding, pair)
+    if distance > 0:
+        return Nearest(q, field, distance, pair)
+    padding = scene.padding_of(pair)
+    distance += 2 * padding
     overlap = f"overlap by {-distance:.3g} m" if np.isfinite(distance) else "overlap"
-    how = overlap if distance <= 0 else f"are {distance:.3g} m apart, with a padding of {scene.padding:g} m on each"
+    how = overlap if distance <= 0 else f"are {distance:.3g} m apart, with a padding of {padding:g} m on each"
     searched = ((room, nearest_free(scene, clearance, scene.in_windows(q), room)) for room in ROOM)
     room, found = next((one for one in searched if one[1] is not None), (0.0, None))
     hollow = _hollow(scene, pair) if distance <= 0 else ""

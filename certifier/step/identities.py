@@ -176,7 +176,8 @@ class IdentityGroups:
         """
         n, box, ground = self._scene.n, self._box, proof.ground
         used = np.flatnonzero(Y.any(axis=0))
-        radii = [volume.radius + self._scene.padding for volume in proof.volumes]
+        padding = self._scene.padding_between(proof.volumes)
+        radii = [volume.radius + padding for volume in proof.volumes]
         rounded = max(radii) > 0
         blocks = []
         height = np.zeros(4 * (n + 1))

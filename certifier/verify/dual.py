@@ -129,7 +129,7 @@ class _Check:
         volumes = [Volume.of(scene.geometry(name)) for name in (proof.pair.a, proof.pair.b)]
         numerators = [Numerators.between(kinematics, proof.frame, volume.body) for volume in volumes]
         self._sides = [_Side(*parts, self._n) for parts in zip(volumes, numerators, proof.moments, strict=True)]
-        self._radii = [exact(volume.radius) + exact(scene.padding) for volume in volumes]
+        self._radii = [exact(volume.radius) + exact(scene.padding_of(proof.pair)) for volume in volumes]
         self._faces = np.array([_near_one(face) for face in [[fmpq(1), *[fmpq(0)] * self._n], *faces_of(ground)]])
         rows = (3,) if self._rounded else range(4)
         self._vanishing = [(c, e) for c in rows for e in range(self._n + 1)]

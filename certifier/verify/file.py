@@ -25,6 +25,7 @@ from certifier.proof.separation import Separation
 from certifier.verify.decimals import exactly, rounded_down, rounded_up
 from certifier.verify.dual import verify_dual
 from certifier.verify.motion import verify_motion
+from certifier.verify.paddings import paddings
 from certifier.verify.pair import PairStatement, verify_pair
 from certifier.verify.region import verify_region
 from certifier.verify.separations import Progress, verify_separation
@@ -72,7 +73,7 @@ def verify_file(data: bytes, processes: int = 1, progress: Progress | None = Non
     with malformed():
         scene = Scene.from_document(header["scene"])
     found, guarantee = _READERS[kind](data, scene, processes, progress)
-    about = (f"scene of hash {scene.hash}", f"padding {exactly(scene.padding)} m around every body")
+    about = (f"scene of hash {scene.hash}", *paddings(scene))
     return FileStatement(kind, scene, (*about, *found, guarantee_line(guarantee)), guarantee)
 
 

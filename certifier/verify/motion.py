@@ -160,7 +160,7 @@ class _Check:
     def __init__(self, proof: MotionProof, known: Known) -> None:
         self._proof, self._scene, self._known = proof, proof.scene, known
         self._pieces = Pieces(proof.scene, proof.motion, proof.rho)
-        self._pairs = known.pairs
+        self._pairs, self._paddings = known.pairs, np.array([proof.scene.padding_of(pair) for pair in proof.scene.pairs])
         self._frames = proof.frames.astype(np.int64)
         self._starts = _starts(proof)
         self._count = proof.counts.sum(axis=1, dtype=np.int64)
@@ -208,7 +208,7 @@ class _Check:
         rates, changes = (np.tile(bounds, (2, 1)) for bounds in self._pieces.rates(piece, t0, t1))
         bent = np.tile((t1 - t0) ** 2 / 8, 2) * own.accelerations(levers, rates, changes)
         needed = (own.radii + bent + proof.rho * levers.sum(axis=1) + error).reshape(2, -1)
-        needs = 2 * self._scene.padding + needed.sum(axis=0)
+        needs = 2 * self._paddings[self._pair[rows]] + needed.sum(axis=0)
         ends = self._ends(sides, of, piece, np.array([t0, t1]), normals)
         gaps = ends.sum(axis=0) / (np.linalg.norm(normals, axis=1) * UP) - needs * UP
         worst = int(gaps.argmin())

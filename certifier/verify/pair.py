@@ -44,7 +44,8 @@ class PairStatement:
 
     Attributes:
         pairs: the pairs of the scene that the proof covers.
-        gap: lower bound in metres of the distance between the two (padded) bodies of each of these pairs on the polytope.
+        gap: lower bound in metres of the distance between the two bodies of each of these pairs on the polytope, with the largest
+            padding of the pairs.
     """
 
     pairs: tuple[Pair, ...]
@@ -161,7 +162,7 @@ class PairCheck:
         if not t > 0:
             raise ProofError("proof_margin", "the margin is not positive")
         plane = [[exact(x) for x in row] for row in proof.plane]
-        padding = exact(scene.padding)
+        padding = exact(scene.padding_between(proof.volumes))
         radii = [exact(volume.radius) + padding for volume in proof.volumes]
         norm = _largest_square_norm(plane[:3])
         if not norm > 0:

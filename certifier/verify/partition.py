@@ -110,18 +110,19 @@ class CellCheck:
         self._multipliers = Multipliers(proof, ground)
 
         # Volumes that no cell chooses cost nothing here, however many vertices a stranger gives them.
+        padding = scene.padding_between(proof.volumes)
         used = {choice: proof.chosen[choice] for choice in np.unique(proof.choices).tolist()}
         wanted = {id(volume) for volumes in used.values() for volume in volumes}
         positive, negative = (
             {
-                id(volume): Side(kinematics, proof.frame, volume, _not_less(volume.radius, scene.padding), sign, self._play)
+                id(volume): Side(kinematics, proof.frame, volume, _not_less(volume.radius, padding), sign, self._play)
                 for volume in (own, *coarse)
                 if id(volume) in wanted
             }
             for own, coarse, sign in zip(proof.volumes, proof.coarse, (1.0, -1.0), strict=True)
         )
         self._sides = {choice: (positive[id(first)], negative[id(second)]) for choice, (first, second) in used.items()}
-        self._rounded = {choice: scene.padding > 0 or first.radius > 0 or second.radius > 0 for choice, (first, second) in used.items()}
+        self._rounded = {choice: padding > 0 or first.radius > 0 or second.radius > 0 for choice, (first, second) in used.items()}
 
     def cells(self, most: int) -> Iterator[Cells]:
         """Yields all cells, at most ``most`` at a time, which :meth:`gap` checks.

@@ -18,6 +18,7 @@ from certifier.verify.archimedean import check_archimedean
 from certifier.verify.box import Halfspaces, limited, within_limits
 from certifier.verify.decimals import exactly, rounded_down, rounded_up
 from certifier.verify.kinematics import exact
+from certifier.verify.paddings import paddings
 from certifier.verify.pair import check_ground
 from certifier.verify.scene import check_scene
 from certifier.verify.separations import Progress, statements
@@ -58,7 +59,7 @@ class RegionStatement:
             *joints,
             f"a bounded, non-empty polytope of {self.faces} half-spaces in tangent space; |s|^2 <= {rounded_up(self.N, 6)}",
             f"{len(self.gaps)} pairs of bodies separated at every configuration of it",
-            f"padding {exactly(scene.padding)} m around every body",
+            *paddings(scene),
             *([f"least distance, padded, at least {rounded_down(self.gap)} m: '{closest.a}' and '{closest.b}'"] if closest else []),
             *not_covered(scene),
             "guarantee: exact (rigorous arithmetic; the parsed model taken at its word)",

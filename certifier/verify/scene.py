@@ -109,7 +109,8 @@ def _check_joint(scene: Scene, joint: Joint) -> None:
 
 
 def _check_bodies(scene: Scene) -> None:
-    _require(_finite(scene.padding) and scene.padding >= 0, "the padding")
+    paddings = (scene.padding, *(pair.padding for pair in scene.pairs if pair.padding is not None))
+    _require(_finite(*paddings) and min(paddings) >= 0, "the padding")
     bodies, names = set(scene.bodies), {geometry.name for geometry in scene.geometries}
     for geometry in scene.geometries:
         vertices = geometry.vertices

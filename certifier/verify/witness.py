@@ -58,7 +58,7 @@ def check_witness(proof: WitnessProof) -> WitnessStatement:
     X = ExactKinematics.at(scene, point).pose(a.body, b.body)
     p, other = (_mean(g.vertices, w) for g, w in zip((a, b), proof.weights, strict=True))
     q = [sum((X[i][j] * other[j] for j in range(3)), X[i][3]) / X[3][3] for i in range(3)]
-    reach = exact(a.radius) + exact(b.radius) + 2 * exact(scene.padding) + exact(TOLERANCE)
+    reach = exact(a.radius) + exact(b.radius) + 2 * exact(scene.padding_of(proof.pair)) + exact(TOLERANCE)
     if not sum(((x - y) ** 2 for x, y in zip(p, q, strict=True)), fmpq(0)) <= reach * reach:
         raise ProofError("proof_witness", f"{a.name} and {b.name} do not touch at the configuration")
     return WitnessStatement(proof.pair, s)

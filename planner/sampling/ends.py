@@ -57,7 +57,7 @@ def in_collision(scene: Scene, q: Array) -> InCollision:
     distance, pair = clearance.least(q)
     searched = (nearest_free(scene, clearance, scene.in_windows(q), room) for room in ROOM)
     free = next((found for found in searched if found is not None), None)
-    return InCollision(pair.a, pair.b, 2 * scene.padding - distance if np.isfinite(distance) else None, free)
+    return InCollision(pair.a, pair.b, -distance if np.isfinite(distance) else None, free)
 
 
 def turned(scene: Scene, start: Array, goal: Array) -> list[Array]:

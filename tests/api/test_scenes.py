@@ -39,6 +39,7 @@ def test_a_scene_is_uploaded_once_whatever_how_often(client: TestClient) -> None
 
     pairs = client.get(f"/v1/scenes/{scene['id']}/pairs").json()["pairs"]
     assert len(pairs) == scene["pairs"]
+    assert all(pair["padding"] == scene["padding"] for pair in pairs)
     assert all(pair["gram_a"] == 2 ** len(pair["chain_a"]) for pair in pairs)
     lint = client.get(f"/v1/scenes/{scene['id']}/lint").json()
     assert set(lint) == {"warnings", "substitutions", "ignored"}

@@ -13,12 +13,17 @@ D = "directives: [{add_model: {name: a, file: a.urdf}}]\n"
 WELD = "{{add_weld: {{parent: world, child: a::l, X_PC: {{{}}}}}}}"
 MIMIC = '<joint name="follow" type="revolute"><parent link="hand"/><child link="tip"/><axis xyz="0 0 1"/><mimic joint="turn"/>'
 MIMIC += '<limit lower="-1" upper="2" effort="1" velocity="1"/></joint><link name="tip"/>'
+TIP = MIMIC.replace('<mimic joint="turn"/>', "")
 FREE = SCENE.replace("  - add_weld: {parent: world, child: room::walls}\n", "")
 SDF_SHAPE = """<sdf version="1.7"><model name="room"><link name="walls"><collision name="wall"><geometry>{}</geometry></collision></link>
 </model></sdf>"""
 MOVING_PLANE = """<sdf version="1.7"><model name="arm"><link name="base"/><link name="hand"><collision name="palm">
 <geometry><plane/></geometry></collision></link>
 <joint name="turn" type="revolute"><parent>base</parent><child>hand</child><axis><xyz>0 0 1</xyz></axis></joint></model></sdf>"""
+LID = """<sdf version="1.9"><model name="lid"><link name="frame"/><link name="floor"><collision name="plane"><geometry><plane>
+<normal>0 0 1</normal></plane></geometry></collision></link><joint name="hinge" type="revolute"><parent>frame</parent>
+<child>floor</child><axis><xyz>1 0 0</xyz><limit><lower>0</lower><upper>0.1</upper></limit></axis></joint></model></sdf>"""
+ADDED_LID = "  - add_model: {name: lid, file: lid.sdf}\n  - add_weld: {parent: world, child: lid::frame}\n"
 FAR = (
     """<robot name="r"><link name="base"/><link name="hand"/>
 <joint name="turn" type="revolute"><parent link="base"/><child link="hand"/><axis xyz="0 0 1"/>
@@ -150,7 +155,11 @@ SCENES: Table = {
         lambda t: t.scene(**mjcf("<joint name='j' type='slide'/><geom size='0.1'/>")),
     ],
     ("joint_range", "q_star"): [lambda t: t.scene(extra="q_star: [9]")],
-    ("scene_field", "fix.arm/turn"): [lambda t: t.scene(extra="fix: {turn: 0, arm/turn: 0}"), lambda t: t.scene(extra="fix: {turn: 9}")],
+    ("scene_field", "fix.arm/turn"): [
+        lambda t: t.scene(extra="fix: {turn: 0, arm/turn: 0}"),
+        lambda t: t.scene(extra="fix: {turn: 9}"),
+        lambda t: t.scene(more=MIMIC.replace('upper="2"', 'upper="1"'), extra="fix: {turn: swept}"),
+    ],
     ("unknown_name", "fix.turn"): [
         lambda t: t.scene(
             SCENE + "  - add_model: {name: two, file: arm.urdf}\n  - add_weld: {parent: world, child: two::base}\n",
@@ -160,13 +169,22 @@ SCENES: Table = {
     ("unknown_name", "fix.turm"): [lambda t: t.scene(extra="fix: {turm: 0}")],
     ("unknown_name", "fix.zzz"): [lambda t: t.scene(extra="fix: {zzz: 0}")],
     ("unsupported_joint", "directives"): [lambda t: t.scene(more=MIMIC)],
-    ("scene_field", "fix"): [lambda t: t.scene(more=MIMIC, extra="fix: {turn: 0, follow: 1}")],
+    ("scene_field", "fix"): [
+        lambda t: t.scene(more=MIMIC, extra="fix: {turn: 0, follow: 1}"),
+        lambda t: t.scene(more=MIMIC, extra="fix: {turn: swept, follow: swept}"),
+    ],
+    ("scene_field", "fix.arm/follow"): [lambda t: t.scene(more=MIMIC, extra="fix: {turn: swept, follow: 1}")],
+    ("joint_range", "fix.arm/turn"): [lambda t: t.scene(kind="continuous", limit="", extra="fix: {turn: swept}")],
+    ("unsupported_joint", "fix.arm/turn"): [lambda t: t.scene(more=TIP, extra="fix: {turn: swept}")],
+    ("unsupported_shape", "directives"): [
+        lambda t: t.scene(SCENE.replace("arm.urdf", "arm.sdf"), files={"arm.sdf": MOVING_PLANE}),
+        lambda t: t.scene(SCENE + ADDED_LID, files={"lid.sdf": LID}, extra="fix: {hinge: swept}"),
+    ],
     ("scene_model_crash", "directives"): [lambda t: load_scene(t.write(scene__yaml=D, a__urdf="<robot name='a'/>"), timeout_s=1e-6)],
     ("unknown_name", "ignore[0][0]"): [
         lambda t: t.scene(extra="ignore: [[arm/hamd, room/walls]]"),
         lambda t: t.scene(extra="ignore: [[zzzzzzz, room/walls]]"),
     ],
-    ("unsupported_shape", "directives"): [lambda t: t.scene(SCENE.replace("arm.urdf", "arm.sdf"), files={"arm.sdf": MOVING_PLANE})],
     ("scene_name", "directives"): [
         lambda t: t.scene(more='<link name="a&#9;b"/><joint name="f" type="fixed"><parent link="hand"/><child link="a&#9;b"/></joint>'),
         lambda t: t.scene(

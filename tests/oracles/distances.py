@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import yaml
+from pydrake.geometry import GeometryId, SceneGraphInspector
 
 from certifier.model import Array
-from certifier.scene.file import read_scene_file
 from tests.oracles.original import original_diagram
 
 
@@ -21,7 +23,8 @@ class Distances:
     """
 
     def __init__(self, path: Path) -> None:
-        self._padding = read_scene_file(path).padding
+        said = yaml.safe_load(re.search(r"^padding: (.*)$", path.read_text(), re.MULTILINE)[1])
+        self._padding, self._own = (said["default"], said["bodies"]) if isinstance(said, dict) else (said, {})
         self._diagram = original_diagram(path)
         self._context = self._diagram.CreateDefaultContext()
         plant = self._diagram.plant()
@@ -41,5 +44,13 @@ class Distances:
         plant, graph = self._diagram.plant(), self._diagram.scene_graph()
         plant.SetPositions(self._diagram.mutable_plant_context(self._context), q)
         query = graph.get_query_output_port().Eval(self._diagram.mutable_scene_graph_context(self._context))
-        found = query.ComputeSignedDistancePairwiseClosestPoints(within + 2 * self._padding)
-        return min((pair.distance for pair in found), default=np.inf) - 2 * self._padding
+        found = query.ComputeSignedDistancePairwiseClosestPoints(within + 2 * max(self._padding, *self._own.values(), 0.0))
+        least = min((pair.distance - 2 * self._of_bodies(query.inspector(), pair.id_A, pair.id_B) for pair in found), default=np.inf)
+        return least if least < within else np.inf
+
+    def _of_bodies(self, inspector: SceneGraphInspector, *geometries: GeometryId) -> float:
+        """Returns the padding of two geometries: the larger one that the file gives for their bodies, or the usual one."""
+        plant = self._diagram.plant()
+        bodies = [plant.GetBodyFromFrameId(inspector.GetFrameId(geometry)) for geometry in geometries]
+        names = [f"{plant.GetModelInstanceName(body.model_instance())}/{body.name()}" for body in bodies]
+        return max((self._own[name] for name in names if name in self._own), default=self._padding)

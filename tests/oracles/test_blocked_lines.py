@@ -39,7 +39,7 @@ def test_drake_finds_contact_where_a_line_is_refused_and_none_where_it_is_not(na
             named = re.search(r": (\S+) and (\S+) touch at q = (.+), on the straight line in s from the seed to this", said)
             assert named is not None, said
             distance, pair = drake.least(np.array([float(x) for x in named[3].split(",")]))
-            assert distance - 2 * scene.padding < 1e-6
+            assert distance < 1e-6
             assert (pair.a, pair.b) == named.groups()[:2]
             refused += 1
         else:

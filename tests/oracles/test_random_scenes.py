@@ -7,6 +7,7 @@ import pytest
 
 from certifier.growth.options import GrowthOptions
 from certifier.jobs.local import grow
+from certifier.pair.collisions import in_collision
 from certifier.scene import load_scene
 from certifier.verify.region import verify_region
 from client.cores import cores
@@ -60,3 +61,20 @@ def test_the_distances_see_a_collision(tmp_path):
     distances = Distances(write_scene(tmp_path, np.random.default_rng(0), 5))
     found = [distances.least(q, 0.1) for q in np.random.default_rng(0).uniform(*distances.limits, (200, 5))]
     assert min(found) < 0 < max(found)
+
+
+def test_what_is_free_keeps_the_padding_of_each_body_by_the_distances(tmp_path):
+    """Bodies may be larger than Drake's own, so what touches by Drake does so for ciris; and much is free for both."""
+    several = 0
+    for seed in range(6):
+        path, rng = write_scene(tmp_path / str(seed), np.random.default_rng(seed), 5), np.random.default_rng(seed)
+        scene, distances = load_scene(path), Distances(path)
+        several += bool(scene.other_paddings())
+        theirs = rng.uniform(*distances.limits, (150, 5))
+        q = np.empty_like(theirs)
+        q[:, distances.order([joint.name for joint in scene.moving])] = theirs
+        free = ~in_collision(scene, scene.to_s(q))
+        least = np.array([distances.least(x, 0.1) for x in theirs])
+        assert (least[free] > -1e-6).all()
+        assert np.mean(free) > 0.5 * np.mean(least > 0)
+    assert several >= 2

@@ -55,10 +55,18 @@ def write_scene(directory: Path, rng: np.random.Generator, joints: int) -> Path:
         lines.append(f"  - add_model: {{name: {name}, file: {name}.{kind}}}")
         if kind != "xml":  # MJCF's bodies stand in its world
             lines.append(f"  - add_weld: {{parent: world, child: {name}::{root}}}")
-    lines += [f"padding: {padding}", *([f"hulls: [{', '.join(f'arm/{name}' for name in many)}]"] if many else [])]
+    lines.append(f"padding: {_padding(padding, arm[-1].name, rng.spawn(1)[0])}")
+    if many:
+        lines.append(f"hulls: [{', '.join(f'arm/{name}' for name in many)}]")
     path = directory / "scene.yaml"
     path.write_text("\n".join(lines) + "\n")
     return path
+
+
+def _padding(usual: float, hand: str, rng: np.random.Generator) -> str:
+    """Returns what the scene file says of padding: one number, or others for the last link and for the room, smaller or larger."""
+    own = {body: float(rng.choice([0.0, 0.001, 0.02])) for body in (f"arm/{hand}", "room/walls") if rng.random() < 0.5}
+    return f"{{default: {usual}, bodies: {{{', '.join(f'{body}: {padding}' for body, padding in own.items())}}}}}" if own else str(usual)
 
 
 def _arm(directory: Path, rng: np.random.Generator, joints: int) -> list[Link]:

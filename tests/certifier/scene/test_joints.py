@@ -142,7 +142,7 @@ def test_limits_of_ones_own(tmp_path):
     [
         ({"extra": "fix: {trun: 0}\n"}, "unknown_name", "fix.trun", "did you mean arm/turn"),
         ({"extra": "fix: {turn: 3}\n"}, "scene_field", "fix.arm/turn", "3 is not within the joint's limits, -1 to 2"),
-        ({"extra": "fix: {turn: x}\n"}, "scene_field", "fix.turn", "must be a number of at most 1e+06"),
+        ({"extra": "fix: {turn: x}\n"}, "scene_field", "fix.turn", "must be a position"),
         ({"extra": "fix: {turn: 9185166224891948.0}\n"}, "scene_field", "fix.turn", "must be a number of at most 1e+06"),
         ({"extra": "q_star: [1e16]\n"}, "scene_field", "q_star[0]", "must be a number of at most 1e+06"),
         ({"extra": "limits: {turn: [-1e16, 1e16]}\n"}, "scene_field", "limits.turn[0]", "must be a number of at most 1e+06"),

@@ -274,11 +274,11 @@ def claims(parts: Parts, rng: Rng) -> None:
 
 
 def pairs(parts: Parts, rng: Rng) -> None:
-    """A pair gone, with its intervals or without them, exchanged with another, or of another body."""
+    """A pair gone, with its intervals or without them, exchanged with another, of another body, or with a padding of its own."""
     header, arrays = parts
     scene = header["scene"]
     i = int(rng.integers(len(scene["pairs"])))
-    way = rng.integers(4)
+    way = rng.integers(6)
     if way == 0:
         del scene["pairs"][i]
         if rng.random() < 0.8:
@@ -289,6 +289,9 @@ def pairs(parts: Parts, rng: Rng) -> None:
     elif way == 1:
         j = int(rng.integers(len(scene["pairs"])))
         scene["pairs"][i], scene["pairs"][j] = scene["pairs"][j], scene["pairs"][i]
+    elif way < 4:
+        padding = scene["padding"] * rng.uniform(0, 2) + rng.choice([0.0, 1e-6, 1e-3, 0.1])
+        scene["pairs"][i] = [*scene["pairs"][i][:2], float(padding)]
     else:
         names = [geometry["name"] for geometry in scene["geometries"]]
         scene["pairs"][i] = sorted(rng.choice(names, 2, replace=False).tolist())

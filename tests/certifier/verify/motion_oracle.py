@@ -84,7 +84,7 @@ class MotionFile:
         found = np.inf
         places = [(piece, t) for piece in range(len(self.pieces)) for t in self._times(piece)]
         q = np.array([self._position(piece, t) for piece, t in places])
-        for a, b in self.scene["pairs"]:
+        for a, b, *_ in self.scene["pairs"]:
             gaps = [self._distance(a, b, x) for x in q]
             for worst in dict.fromkeys(np.argsort(gaps)[:2].tolist()):
                 piece, t = places[worst]
@@ -136,7 +136,11 @@ class MotionFile:
     def _distance(self, a: str, b: str, q: np.ndarray) -> float:
         one, other = self._geometries[a], self._geometries[b]
         A, B = (self._placed(geometry, q) for geometry in (one, other))
-        return closest(A, B).distance - one["radius"] - other["radius"] - 2 * self.scene["padding"]
+        return closest(A, B).distance - one["radius"] - other["radius"] - 2 * self._padding(a, b)
+
+    def _padding(self, a: str, b: str) -> float:
+        own = [names[2] for names in self.scene["pairs"] if names[:2] == [a, b] and len(names) == 3]
+        return own[0] if own else self.scene["padding"]
 
     def _placed(self, geometry: dict[str, Any], q: np.ndarray) -> np.ndarray:
         R, p, body = np.eye(3), np.zeros(3), geometry["body"]
@@ -175,7 +179,7 @@ class MotionFile:
                 mean = [sum((w * _exact(v[i]) for w, v in rows), arb(0)) / whole for i in range(3)]
                 ends.append(self._moved(geometry["body"], mean, x))
             square = sum(((u - v) ** 2 for u, v in zip(*ends, strict=True)), arb(0))
-            reach = _exact(one["radius"]) + _exact(other["radius"]) + 2 * _exact(self.scene["padding"])
+            reach = _exact(one["radius"]) + _exact(other["radius"]) + 2 * _exact(self._padding(a, b))
             upper = (arb(square.upper()).sqrt() if square.upper() > 0 else arb(0)) - reach
             return float(np.nextafter(float(upper.upper()), np.inf))
 
