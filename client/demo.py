@@ -113,7 +113,7 @@ def _stack() -> Iterator[str]:
         return
     log = data_dir() / "logs" / "stack.log"
     log.parent.mkdir(parents=True, exist_ok=True)
-    print("starting the service ...", flush=True)
+    print("starting the service (the first time, it compiles for a minute or two) ...", flush=True)
     with log.open("ab") as errors:
         stack = subprocess.Popen([sys.executable, "-P", "-m", "workers.stack"], stdout=subprocess.PIPE, stderr=errors, text=True)
     try:

@@ -78,6 +78,7 @@ class _Memory:
     deadline_s: float | None = None
     former: Former | None = None
     deliver: Deliver | None = None
+    propose: Callable[[Propose], Proposal] | None = None
     start: float = field(default_factory=lambda: time.perf_counter())
     state: GrowthState | None = None
     action: Action | None = None
@@ -169,7 +170,7 @@ class _Memory:
                 return self._certify(action)
             if isinstance(action, Propose):
                 self.tell("step", {"kind": "propose", "state": "running", "seconds": None})
-                found = self._proposed(action)
+                found = (self.propose or self._proposed)(action)
                 self.seeding_seconds = found.info["seconds"]
                 self.tell("step", {"kind": "propose", "state": "done", "seconds": self.seeding_seconds})
                 return found
@@ -227,6 +228,7 @@ def grow(
     deadline_s: float | None = None,
     processes: int = 1,
     deliver: Deliver | None = None,
+    propose: Callable[[Propose], Proposal] | None = None,
 ) -> Region:
     """Grows a certified region in this process, or with ``processes`` children of it; the region is the same.
 
@@ -240,7 +242,7 @@ def grow(
     Raises:
         CirisError: no region could be certified; the code is ``not_grown`` or that of the seeding's error.
     """
-    return _grown(_Memory(scene, options, tell, processes, deadline_s, deliver=deliver))
+    return _grown(_Memory(scene, options, tell, processes, deadline_s, deliver=deliver, propose=propose))
 
 
 def recertify(

@@ -13,7 +13,8 @@ from certifier import stored
 from certifier.errors import RegionError
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee
-from certifier.polytopes.polytope import chebyshev_center, drop_redundant
+from certifier.polytopes.polytope import chebyshev_center
+from certifier.seeding.arm import AT, NEAR, arm
 from certifier.seeding.free import Nearest, check_free
 from certifier.seeding.hindrance import hindrance
 from certifier.seeding.limits import check_limits, off_limits
@@ -102,9 +103,8 @@ def _refuse_hindered(scene: Scene, checked: list[Nearest]) -> None:
 
 
 def warm_up() -> None:
-    """Loads the compiled functions that a proposal needs."""
-    eye = np.eye(2)
-    drop_redundant(Polytope(np.concatenate([eye, -eye]), np.ones(4)))
+    """Loads the compiled functions that a proposal needs, and Drake's libraries, by making one for a small arm."""
+    propose(arm(), SeedOptions(q=AT, contain=(NEAR,), delta=0.5))
 
 
 def propose_in_child(payload: dict[str, Any]) -> dict[str, Any]:
