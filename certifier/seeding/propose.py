@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from certifier import stored
 from certifier.errors import RegionError
+from certifier.isolation.telling import tell
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.polytope import chebyshev_center
@@ -67,6 +68,7 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
         center = scene.to_s(off_limits(scene, options.q))
         points = np.concatenate([center[None], contain])
         checked += check_lines(scene, points, checked)
+        tell(hindrance=hindrance(scene, checked))  # in case it takes longer than there is time
         if method is Method.LIMITS:
             C, d = np.zeros((0, scene.n)), np.zeros(0)
             said = {}
