@@ -8,7 +8,7 @@ from certifier.seeding.proposal import NO_ROOM, TOO_LONG, mend
 
 DEADLINE = "the deadline was reached"
 """The reason of a growth that had no time left."""
-THIN = "the remaining polytope around the seed is too thin to continue"
+THIN = "the space that remains around the seed is too thin to continue"
 """The reason of a growth that reached a polytope whose interior is too small for doubles. Users did not give that polytope."""
 
 
@@ -18,7 +18,7 @@ def ended_by(error: CirisError, hindrance: str) -> CirisError:
     Args:
         hindrance: as :class:`certifier.growth.state.Start` has it.
     """
-    about_polytope = isinstance(error, RegionError) and error.field == "polytope"
+    about_polytope = isinstance(error, RegionError) and error.field in ("polytope", "start")
     return refusal(hindrance or THIN, late=False) if about_polytope else error
 
 

@@ -52,7 +52,7 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
     Raises:
         RegionError: as :func:`check_seed`, :func:`certifier.seeding.lines.check_lines` and ``polytope.chebyshev_center``;
             ``polytope_shape``; ``center_outside``; ``seed_hindered``; ``seed_cut_off`` when the polytope does not contain the seed and
-            ``contain``; ``seeding_failed`` with Drake's words.
+            ``contain``; ``seeding_failed``.
     """
     start = time.perf_counter()
     method = options.method or Method.IRIS
@@ -85,8 +85,11 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
             if not (d[:, None] > C @ points.T).all():
                 _refuse_hindered(scene, checked)
     if not (d[:, None] > C @ np.concatenate([center[None], contain]).T).all():
-        problem = f"the polytope of {method} does not contain the seed" + (" and all of contain" if options.contain else "")
-        raise RegionError("seed_cut_off", problem, field="seed", hint="allow fewer iterations, or give points that see one another")
+        kept = "the seed and all of contain" if options.contain else "the seed"
+        if method is Method.POLYTOPE:
+            raise RegionError("seed_cut_off", f"the given polytope does not contain {kept}", field="seed", hint="give one that does")
+        hint = "leave the method out, or give configurations that see one another"
+        raise RegionError("seed_cut_off", f"the method {method} found no region that contains {kept}", field="seed", hint=hint)
     guarantee = said.pop("guarantee", Guarantee.NONE)
     info = {"method": method.value, "guarantee": guarantee.value, "faces": len(d), "seconds": time.perf_counter() - start, **said}
     if known := hindrance(scene, checked):
