@@ -83,8 +83,8 @@ class Growing(Kind):
         return isinstance(action, Finish) or (isinstance(action, Certify) and not action.pairs)
 
     def late(self, session: Session, job: JobRow) -> Finish:
-        told = events.last(session, job.id, events.NOTE) or {}
-        return growing.late(_state(jobs.growth(session, job.id)), bool(steps.accepted(session, job.id)), told)
+        scene, state = load_scene(job.scene_id), _state(jobs.growth(session, job.id))
+        return growing.late(scene, state, bool(steps.accepted(session, job.id)), events.last(session, job.id, events.NOTE) or {})
 
     def do(self, claim: steps.Claim, scene: Scene) -> Done:
         if claim.kind == Propose.kind:

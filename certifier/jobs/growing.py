@@ -35,7 +35,7 @@ def decided(scene: Scene, options: GrowthOptions, state: GrowthState | None, rep
     return advance(scene, state, report)
 
 
-def late(state: GrowthState | None, certified: bool, told: dict[str, Any]) -> Finish:
+def late(scene: Scene, state: GrowthState | None, certified: bool, told: dict[str, Any]) -> Finish:
     """Returns the end of a growth whose time has run out.
 
     Args:
@@ -44,8 +44,7 @@ def late(state: GrowthState | None, certified: bool, told: dict[str, Any]) -> Fi
     """
     if certified:
         return Finish(Outcome.CERTIFIED, DEADLINE)
-    hindrance = told.get("hindrance", "") if state is None or state.start is None else state.start.hindrance
-    return Finish(Outcome.INCONCLUSIVE, at_deadline(hindrance))
+    return Finish(Outcome.INCONCLUSIVE, at_deadline(scene, state, told.get("hindrance", "")))
 
 
 def proposing(seconds: float, told: dict[str, Any]) -> str:
@@ -73,7 +72,7 @@ def refused(finish: Finish, error: CirisError | None) -> CirisError | None:
     """
     if finish.outcome is Outcome.CERTIFIED:
         return None
-    return error or refusal(finish.reason, late=finish.reason == DEADLINE)
+    return error or refusal(finish.reason, late=finish.reason.startswith(DEADLINE))
 
 
 @dataclass(frozen=True)

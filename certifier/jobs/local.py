@@ -131,7 +131,7 @@ class _Memory:
         if isinstance(self.action, Finish):
             return False
         if self.passed >= 1:
-            self.action = late(self.state, self.candidate is not None, self.told)
+            self.action = late(self.scene, self.state, self.candidate is not None, self.told)
             return False
         if self.deliver is not None and self.candidate is not self.made and self.seconds >= self.rests_until:
             self.deliver(self.region())
@@ -195,7 +195,7 @@ class _Memory:
         except CirisError as error:
             if error.code != "child_timeout":
                 raise
-            finish = late(self.state, False, self.told)
+            finish = late(self.scene, self.state, False, self.told)
             raise refused(finish, None) or error from None
 
     def _certify(self, action: Certify) -> Outcomes:
