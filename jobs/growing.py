@@ -114,7 +114,7 @@ def _noting(job_id: str) -> Tell:
             with database().read() as session:
                 job = jobs.get(session, job_id)
                 parent, number = job.parent_id, job.number
-            _note(job_id, {"text": text, "part": None, **told})
+            _note(job_id, {"text": text, "part": None, **{name: value for name, value in told.items() if value}})
             if parent is not None:
                 _note(parent, {"text": f"region {number}: {text}", "part": None})
 

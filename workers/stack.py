@@ -162,8 +162,7 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
                 child.start(environment, data / "logs")
                 reaper.watch(_groups(children))
             _describe(data, url, children)
-            if _wait_until_healthy(url, stopping, data):
-                _wait_for_solver(children, settings, stopping)
+            if _wait_until_healthy(url, stopping, data) and _wait_for_solver(children, settings, stopping):
                 ready(url)
             _supervise(children, environment, data, url, reaper, stopping)
         finally:
@@ -268,10 +267,10 @@ def _wait_until_healthy(url: str, stopping: Callable[[], bool], data: Path) -> b
     return False
 
 
-def _wait_for_solver(children: list[Child], settings: Settings, stopping: Callable[[], bool]) -> None:
+def _wait_for_solver(children: list[Child], settings: Settings, stopping: Callable[[], bool]) -> bool:
     """Waits until the solve worker has loaded what jobs call, which may have to be compiled first. The time of a job begins with the job.
 
-    It does not wait for what has to be started again first.
+    It does not wait for what has to be started again first. It returns False when the stack is to stop before.
     """
     (solver,) = (child.process for child in children if child.name == "solve")
     assert solver is not None, "all children are started"
@@ -282,6 +281,7 @@ def _wait_for_solver(children: list[Child], settings: Settings, stopping: Callab
                 break
         time.sleep(POLL_SECONDS)
     database.close()
+    return not stopping()
 
 
 @contextmanager
