@@ -13,6 +13,8 @@ import threading
 import warnings
 from typing import Any
 
+NURSERY_S = 60.0
+"""A process that solves takes work when it has what makes proposals, or after this many seconds."""
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 
@@ -51,8 +53,6 @@ def main() -> None:
         from certifier.jobs import kernels
 
         kernels.warm_up()  # before it takes any work, and once for all processes that it forks
-    if asked.background:
-        give_way()
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # Celery says there in plain lines that it was asked to end
     # It warns of a superuser's worker that would take pickled messages. Ours take JSON only.
     warnings.filterwarnings("ignore", category=SecurityWarning)
@@ -68,7 +68,9 @@ def main() -> None:
         if queue == SOLVE:
             from certifier.seeding import PROPOSE
 
-            prepare(PROPOSE)
+            nursery = prepare(PROPOSE, NURSERY_S)
+            if asked.background:
+                give_way(nursery)
         traces.configure(queue)
 
     @worker_process_shutdown.connect(weak=False)
@@ -80,6 +82,8 @@ def main() -> None:
 
     @worker_ready.connect(weak=False)
     def begin(sender: Any, **_: Any) -> None:
+        if asked.background:
+            give_way()
         threading.Thread(target=presence.run, args=(sender,), name="presence", daemon=True).start()
         if queue == CONTROL:
             traces.configure(queue)

@@ -103,11 +103,14 @@ def run_in_child(
     return _result(json.loads(answer, object_hook=decode))
 
 
-def prepare(function: str) -> None:
-    """Begins to load what the first call of a function needs, without waiting."""
+def prepare(function: str, wait_s: float = 0.0) -> int:
+    """Begins to load what the first call of a function needs, waits for it at most this long, and returns the id of the process."""
     module = function.partition(":")[0]
     if not _idle.get(module):
         _idle.setdefault(module, []).append(_Nursery(module))
+    nursery = _idle[module][-1]
+    nursery.wait(wait_s)
+    return nursery.process.pid
 
 
 def _free(module: str) -> _Nursery:
@@ -177,6 +180,10 @@ class _Nursery:
             self.kill()
             raise
         return STATUS.unpack_from(reply)[0], reply[STATUS.size :]
+
+    def wait(self, seconds: float) -> None:
+        """Waits until the process says something, or has ended, but no longer than this."""
+        self._connection.poll(seconds)
 
     def _answer(self, timeout_s: float, tell: Tell | None = None) -> bytes:
         """Returns what the nursery says next. Until then, ``tell`` hears how far the function is.
