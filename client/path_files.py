@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -24,6 +25,8 @@ _NAMES = ("q", "s", "bezier", "knots", "control_points", "t")
 def path_file(path: str) -> GivenPath:
     """Reads q or s and perhaps t from an npz, JSON, YAML or CSV file; or a curve, but not from CSV.
 
+    Rows of q in JSON and YAML may be names of configurations.
+
     A CSV file has one row for each waypoint. Its first row may name the columns; one that is called t holds the times. Its numbers are q,
     unless all other columns' names begin with s.
 
@@ -34,7 +37,7 @@ def path_file(path: str) -> GivenPath:
     if suffix not in KINDS:
         raise RegionError("path_file", f"{path} is neither .npz nor .json, .yaml or .csv", field=FIELD, hint=_HINT)
     try:
-        content = {".npz": _arrays, ".csv": _table}.get(suffix, _document)(path)
+        content: dict[str, Any] = _READERS.get(suffix, _document)(path)
     except FileNotFoundError:
         raise RegionError("path_file", f"there is no file {path}", field=FIELD, hint=_HINT) from None
     except CirisError:
@@ -45,18 +48,19 @@ def path_file(path: str) -> GivenPath:
     given = {name: content[name] for name in _NAMES[:-1] if name in content}
     if tuple(given) not in (("q",), ("s",), ("bezier",), ("knots", "control_points")):
         raise RegionError("path_file", f"{path} must have either q or s, or one curve", field=FIELD, hint=_HINT)
+    times = content.get("t")
     try:
-        found, times = curve(given), content.get("t")
+        found = None if isinstance(given.get("q"), list) else curve(given)
     except RegionError as error:
         error.field = f"{FIELD} {error.field}"
         raise
-    motion = {name: array.tolist() for name, array in given.items()}
+    motion = {name: value if isinstance(value, list) else value.tolist() for name, value in given.items()}
     if found is not None and found.times is not None:
         if times is not None:
             raise RegionError("path_file", f"{path} has knots, which are its times, and t", field=FIELD, hint="leave t out")
         return GivenPath(motion, found.times.tolist())
     places = next(iter(given.values())) if found is None else found.controls[:: found.degree]
-    if times is not None and not (times.shape == places.shape[:1] and (np.diff(times) > 0).all()):
+    if times is not None and not (times.shape == (len(places),) and (np.diff(times) > 0).all()):
         problem = f"t of {path} must be ascending numbers, one for each waypoint, or for each piece's beginning and for the end"
         raise RegionError("path_file", problem, field=FIELD, hint="t may be left out")
     return GivenPath(motion, None if times is None else times.tolist())
@@ -67,12 +71,24 @@ def _arrays(path: str) -> dict[str, Array]:
         return {name: arrays[name].astype(float, casting="same_kind") for name in arrays.files if name in _NAMES}
 
 
-def _document(path: str) -> dict[str, Array]:
+def _document(path: str) -> dict[str, Any]:
+    """Returns the arrays of a document; where rows of q are names, q as a list."""
     text = Path(path).read_text(encoding="utf-8")
     document: Any = json.loads(text) if path.lower().endswith(".json") else yaml.safe_load(text)
     if not isinstance(document, dict):
         raise TypeError("not a mapping")
-    return {name: np.array(document[name], dtype=float) for name in _NAMES if name in document}
+    return {name: _rows(document[name]) if name == "q" else np.array(document[name], dtype=float) for name in _NAMES if name in document}
+
+
+def _rows(q: Any) -> Any:
+    """Returns waypoints (K, n) as an array, or as a list with the names of configurations as they are.
+
+    Raises:
+        ValueError, TypeError: they are neither names nor numbers.
+    """
+    if not (isinstance(q, list) and any(isinstance(row, str) for row in q)):
+        return np.array(q, dtype=float)
+    return [row if isinstance(row, str) else np.array(row, dtype=float).tolist() for row in q]
 
 
 def _table(path: str) -> dict[str, Array]:
@@ -93,6 +109,10 @@ def _table(path: str) -> dict[str, Array]:
     in_s = bool(names) and all(name.startswith("s") for name in names if name != "t")
     found = {"s" if in_s else "q": numbers[:, ~timed]}
     return found | ({"t": numbers[:, timed][:, 0]} if timed.any() else {})
+
+
+_READERS: dict[str, Callable[[str], dict[str, Any]]] = {".npz": _arrays, ".csv": _table}
+"""What reads a file by its suffix, where it is not a document."""
 
 
 def _is_number(text: str) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 from certifier.errors import CirisError
 from certifier.options import Option, Takes, fits, within
 from ciris.documents import Document
-from client.inputs import configuration, labels
+from client.inputs import Given, configuration, labels
 from client.options import JOB, Part
 
 
@@ -87,7 +87,7 @@ def _value(one: Option, value: Any) -> Any:
     return value
 
 
-def _waypoints(path: str) -> list[list[float]]:
+def _waypoints(path: str) -> list[Given]:
     """Returns the waypoints of a file, which have to be joint positions."""
     from client.path_files import path_file  # which needs numpy
 
@@ -95,4 +95,5 @@ def _waypoints(path: str) -> list[list[float]]:
     if "q" not in read.motion:
         message = f"{path} has no waypoints in q; a path to cover is straight in q between them"
         raise CirisError("option", message, field="--path", hint="give waypoints in q")
-    return read.motion["q"]
+    waypoints: list[Given] = read.motion["q"]
+    return waypoints

@@ -10,6 +10,9 @@ from sqlalchemy.orm import Session
 
 from db.models import EventRow, JobRow
 
+NOTE = "note"
+"""The kind of an event that only says how far something is."""
+
 
 def emit(session: Session, job: JobRow, kind: str, data: dict[str, Any]) -> None:
     """Adds the job's next event. The caller holds the job's lock.
@@ -23,10 +26,18 @@ def emit(session: Session, job: JobRow, kind: str, data: dict[str, Any]) -> None
     - ``region``: region_id, iteration, guarantee, ellipsoid_volume, and what lists show of the manifest: q_volume and share;
     - ``cover``: of a cover, what a look at the scene has found, as :func:`planner.cover.result.said` says it;
     - ``child``: of a cover, job (its id), number, purpose, q and state; at its end also region_id and reason;
+    - ``note``: text and part: how far a step is, in words and from 0 to 1 or None; of a proposal also faces and hindrance, where known;
     - ``lost``: worker, reason, and either iteration and pairs or step, which are open again.
     """
     job.event_seq += 1
     session.add(EventRow(job_id=job.id, seq=job.event_seq, kind=kind, data=data))
+
+
+def last(session: Session, job_id: str, kind: str) -> dict[str, Any] | None:
+    """Returns the data of the job's last event, if it is of this kind; None otherwise."""
+    query = select(EventRow).where(EventRow.job_id == job_id).order_by(EventRow.seq.desc()).limit(1)
+    event = session.scalar(query)
+    return event.data if event is not None and event.kind == kind else None
 
 
 def before(session: Session, job_id: str, seq: int, limit: int) -> Sequence[EventRow]:

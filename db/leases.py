@@ -42,12 +42,12 @@ LOOK_SECONDS = 0.5
 
 def this_worker() -> str:
     """Returns the name of this process, ``host:pid:start``. The start time tells it from a later process with the same number."""
-    return _name(os.getpid())
+    return name_of(os.getpid())
 
 
 def parent_worker() -> str:
     """Returns the name of the process that has forked this one."""
-    return _name(os.getppid())
+    return name_of(os.getppid())
 
 
 def is_alive(worker: str | None) -> bool | None:
@@ -61,7 +61,8 @@ def died_alone(worker: str | None, parent: str | None) -> bool:
     return is_alive(worker) is False and is_alive(parent) is True
 
 
-def _name(pid: int) -> str:
+def name_of(pid: int) -> str:
+    """Returns the name of a process of this host."""
     return f"{_host()}:{pid}:{_started(pid)}"
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import time
+from contextlib import suppress
 from functools import lru_cache, partial
 from typing import Any
 
@@ -14,6 +16,7 @@ from certifier.growth.actions import Action, Candidate, Certify, Failed, Finish,
 from certifier.growth.machine import stored_state
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import GrowthState
+from certifier.isolation.child import Tell
 from certifier.jobs import growing
 from certifier.jobs.growing import Account, Certified
 from certifier.jobs.share import SampledProposal
@@ -25,11 +28,11 @@ from certifier.seeding import PROPOSE
 from certifier.seeding.proposal import Proposal
 from certifier.step.step import step as polytope_step
 from certifier.step.stepped import Stepped
-from db import jobs, pairs, proofs, regions, steps, subtrees
+from db import events, jobs, pairs, proofs, regions, steps, subtrees
 from db.models import IterationRow, JobRow
-from db.session import database
+from db.session import UNAVAILABLE, database
 from db.settings import settings
-from db.states import ACCEPT, IterationState
+from db.states import ACCEPT, IterationState, JobState
 from db.transaction import Afterwards, persistently
 from db.types import utcnow
 from jobs import admission, obstacles
@@ -37,6 +40,9 @@ from jobs.former import former_of
 from jobs.kind import Done, Held, Kind, Turn, in_child, report_of
 from jobs.scenes import load_scene
 from workers.app import send_work
+
+NOTE_S = 5.0
+"""Events tell this often how far a proposal is."""
 
 
 class Growing(Kind):
@@ -77,11 +83,13 @@ class Growing(Kind):
         return isinstance(action, Finish) or (isinstance(action, Certify) and not action.pairs)
 
     def late(self, session: Session, job: JobRow) -> Finish:
-        return growing.late(_state(jobs.growth(session, job.id)), bool(steps.accepted(session, job.id)))
+        scene, state = load_scene(job.scene_id), _state(jobs.growth(session, job.id))
+        return growing.late(scene, state, bool(steps.accepted(session, job.id)), events.last(session, job.id, events.NOTE) or {})
 
     def do(self, claim: steps.Claim, scene: Scene) -> Done:
         if claim.kind == Propose.kind:
-            return Done(in_child(PROPOSE, {"scene": scene.to_document(), "seed": claim.input["seed"]}))
+            payload = {"scene": scene.to_document(), "seed": claim.input["seed"]}
+            return Done(in_child(PROPOSE, payload, tell=_noting(claim.job_id)))
         return _accept(claim, scene) if claim.kind == ACCEPT else _step(claim, scene)
 
     def failure(self, finish: Finish, error: dict[str, Any] | None) -> dict[str, Any] | None:
@@ -90,6 +98,35 @@ class Growing(Kind):
 
     def held(self, session: Session, scene: Scene, job: JobRow) -> list[Held]:
         return obstacles.of_growth(session, scene, job)
+
+
+def _noting(job_id: str) -> Tell:
+    """Returns what tells in the events of a job, and of the cover that it is a part of, how far its proposal is."""
+    begun, noted = time.monotonic(), 0.0
+
+    def tell(told: dict[str, Any]) -> None:
+        nonlocal noted
+        seconds = time.monotonic() - begun
+        if seconds < noted + NOTE_S and not (noted == 0.0 and told.get("hindrance")):
+            return
+        noted, text = seconds, growing.proposing(seconds, told)
+        with suppress(*UNAVAILABLE):
+            with database().read() as session:
+                job = jobs.get(session, job_id)
+                parent, number = job.parent_id, job.number
+            _note(job_id, {"text": text, "part": None, **{name: value for name, value in told.items() if value}})
+            if parent is not None:
+                _note(parent, {"text": f"region {number}: {text}", "part": None})
+
+    return tell
+
+
+def _note(job_id: str, data: dict[str, Any]) -> None:
+    """Says in the events of a job that runs how far its work is."""
+    with database().write() as session:
+        job = jobs.lock(session, job_id)
+        if job.state == JobState.RUNNING:
+            events.emit(session, job, events.NOTE, data)
 
 
 def _state(document: dict[str, Any] | None) -> GrowthState | None:

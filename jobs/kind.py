@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 from certifier.errors import CirisError
 from certifier.growth.actions import Finish
 from certifier.growth.refusal import DEADLINE
-from certifier.isolation.child import run_in_child
+from certifier.isolation.child import Tell, run_in_child
 from certifier.model import Scene
 from certifier.outcome import Outcome
 from db import steps
@@ -169,12 +169,12 @@ def report_of(session: Session, job: JobRow, kind: str) -> dict[str, Any] | Ciri
     return CirisError.from_document(found) if step.state == StepState.FAILED else found
 
 
-def in_child(function: str, payload: dict[str, Any], kept: tuple[str, str] | None = None) -> dict[str, Any]:
+def in_child(function: str, payload: dict[str, Any], kept: tuple[str, str] | None = None, tell: Tell | None = None) -> dict[str, Any]:
     """Returns what a function finds in a child process. If that aborts, hangs or wants too much memory, only the step fails.
 
     Args:
-        kept: as for certifier.isolation.child.run_in_child.
+        kept, tell: as for certifier.isolation.child.run_in_child.
     """
     seconds, memory = settings().time_limit_seconds, settings().child_memory_bytes
-    found: dict[str, Any] = run_in_child(function, payload, timeout_s=seconds, memory_bytes=memory, kept=kept)
+    found: dict[str, Any] = run_in_child(function, payload, timeout_s=seconds, memory_bytes=memory, kept=kept, tell=tell)
     return found

@@ -1,7 +1,8 @@
 """``python -m workers control`` or ``python -m workers solve`` runs one Celery worker, with the settings of the environment.
 
 The control worker coordinates jobs in threads, runs the sweeper, delivers webhooks and copies SQLite's log into its database. The solve
-worker runs ``CIRIS_SOLVE_PROCESSES`` processes. Each computes in one thread, because the pairs already run in parallel.
+worker runs ``CIRIS_SOLVE_PROCESSES`` processes, after it has loaded what they call (certifier.jobs.kernels). Each computes in one thread,
+because the pairs already run in parallel.
 """
 
 from __future__ import annotations
@@ -12,13 +13,17 @@ import threading
 import warnings
 from typing import Any
 
+NURSERY_S = 60.0
+"""A process that solves takes work when it has what makes proposals, or after this many seconds."""
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m workers", description="A Celery worker of ciris.")
     parser.add_argument("queue", choices=["control", "solve"])
-    queue = parser.parse_args().queue
+    parser.add_argument("--background", action="store_true", help="let everything else on this machine go first")
+    asked = parser.parse_args()
+    queue: str = asked.queue
     os.environ.update(ONE_THREAD)  # must come before numpy is imported
 
     from celery.exceptions import SecurityWarning
@@ -33,7 +38,7 @@ def main() -> None:
     from workers.app import CONTROL, SOLVE, celery_app
     from workers.heartbeat import Heartbeat
     from workers.presence import Presence
-    from workers.processes import die_with_parent
+    from workers.processes import die_with_parent, give_way
     from workers.tasks import register
     from workers.troubles import Troubles
 
@@ -44,6 +49,10 @@ def main() -> None:
     stop, worker = threading.Event(), os.getpid()
 
     logs.configure(queue)
+    if queue == SOLVE:
+        from certifier.jobs import kernels
+
+        kernels.warm_up()  # before it takes any work, and once for all processes that it forks
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # Celery says there in plain lines that it was asked to end
     # It warns of a superuser's worker that would take pickled messages. Ours take JSON only.
     warnings.filterwarnings("ignore", category=SecurityWarning)
@@ -59,7 +68,9 @@ def main() -> None:
         if queue == SOLVE:
             from certifier.seeding import PROPOSE
 
-            prepare(PROPOSE)
+            nursery = prepare(PROPOSE, NURSERY_S)
+            if asked.background:
+                give_way(nursery)
         traces.configure(queue)
 
     @worker_process_shutdown.connect(weak=False)
@@ -71,6 +82,8 @@ def main() -> None:
 
     @worker_ready.connect(weak=False)
     def begin(sender: Any, **_: Any) -> None:
+        if asked.background:
+            give_way()
         threading.Thread(target=presence.run, args=(sender,), name="presence", daemon=True).start()
         if queue == CONTROL:
             traces.configure(queue)

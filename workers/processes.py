@@ -34,9 +34,15 @@ def die_with_parent(sig: int = signal.SIGKILL, parent: int | None = None) -> Non
             os.kill(os.getpid(), sig)
 
 
-def give_way() -> None:
-    """Lets every other process go first: by this process's niceness, and by that of its session, which Linux' autogroups compare."""
-    os.nice(NICENESS)
+def give_way(*children: int) -> None:
+    """Lets every other process go first: by this process's niceness, and by that of its session, which Linux' autogroups compare.
+
+    Args:
+        children: ids of processes that this one has started, which give way too.
+    """
+    for process in (os.getpid(), *children):
+        with suppress(ProcessLookupError):
+            os.setpriority(os.PRIO_PROCESS, process, os.getpriority(os.PRIO_PROCESS, process) + NICENESS)
     with suppress(OSError):
         Path("/proc/self/autogroup").write_text(str(NICENESS))
 

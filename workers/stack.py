@@ -38,12 +38,12 @@ from types import FrameType
 from typing import IO
 
 from certifier.errors import CirisError
-from db import keys, logs, migrate
+from db import keys, leases, logs, migrate, workers
 from db.disk import Disk, lacks_room
-from db.session import UNAVAILABLE
+from db.session import UNAVAILABLE, Database
 from db.settings import Settings
 from db.vault import kept_key
-from workers.processes import die_with_parent, give_way, queue_server_command, queue_url
+from workers.processes import die_with_parent, queue_server_command, queue_url
 from workers.reaper import Reaper
 
 log = logging.getLogger(__name__)
@@ -66,7 +66,6 @@ class Child:
     """Holds one supervised process. It has a session of its own, so that Ctrl-C reaches only the supervisor.
 
     Attributes:
-        background: True for a child that computes; on a busy machine the other children answer first.
         may_end: True for a worker. Its status 0 says that somebody has drained it, and then it is not started again.
         own: environment variables of this child alone.
     """
@@ -74,7 +73,6 @@ class Child:
     name: str
     command: list[str]
     stop_signal: int
-    background: bool = False
     may_end: bool = False
     own: dict[str, str] = field(default_factory=dict)
     process: subprocess.Popen[bytes] | None = None
@@ -106,8 +104,6 @@ class Child:
         signal.signal(self.stop_signal, signal.SIG_DFL)  # a script's background processes inherit that SIGINT is ignored
         # Without the supervisor there is no queue that a worker could give its messages back to, and Celery would wait for it.
         die_with_parent(parent=supervisor)
-        if self.background:
-            give_way()
 
     @property
     def dead(self) -> bool:
@@ -147,7 +143,7 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
 
     Args:
         port: the API's port; None takes the setting's port, or any free one when that is taken.
-        ready: called once with the API's URL, when the API answers.
+        ready: called once with the API's URL, when the API answers and the solve worker takes work.
 
     Raises:
         CirisError: data_directory, no_room, stack_running, port_taken, no_keys, or stack_failed when the API does not come up.
@@ -166,7 +162,7 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
                 child.start(environment, data / "logs")
                 reaper.watch(_groups(children))
             _describe(data, url, children)
-            if _wait_until_healthy(url, stopping, data):
+            if _wait_until_healthy(url, stopping, data) and _wait_for_solver(children, settings, stopping):
                 ready(url)
             _supervise(children, environment, data, url, reaper, stopping)
         finally:
@@ -195,7 +191,7 @@ def _children(settings: Settings, data: Path, queue_socket: Path) -> list[Child]
     """Returns the child processes, in the order of starting."""
     children = [
         Child("control", [sys.executable, "-P", "-m", "workers", "control"], signal.SIGQUIT, may_end=True),
-        Child("solve", [sys.executable, "-P", "-m", "workers", "solve"], signal.SIGQUIT, background=True, may_end=True),
+        Child("solve", [sys.executable, "-P", "-m", "workers", "solve", "--background"], signal.SIGQUIT, may_end=True),
     ]
     for name in ["api", *(f"api-{i}" for i in range(2, settings.api_processes + 1))]:
         counts = {"CIRIS_REQUESTS_FILE": str(data / "requests" / name)}
@@ -269,6 +265,23 @@ def _wait_until_healthy(url: str, stopping: Callable[[], bool], data: Path) -> b
                 raise CirisError("stack_failed", f"the API at {url} does not answer", hint=f"see {data / 'logs'}") from None
         time.sleep(POLL_SECONDS)
     return False
+
+
+def _wait_for_solver(children: list[Child], settings: Settings, stopping: Callable[[], bool]) -> bool:
+    """Waits until the solve worker has loaded what jobs call, which may have to be compiled first. The time of a job begins with the job.
+
+    It does not wait for what has to be started again first. It returns False when the stack is to stop before.
+    """
+    (solver,) = (child.process for child in children if child.name == "solve")
+    assert solver is not None, "all children are started"
+    database, name = Database(settings.database), leases.name_of(solver.pid)
+    while not stopping() and not any(child.dead for child in children):
+        with suppress(*UNAVAILABLE), database.read() as session:
+            if workers.wanted(session, name) is not None:
+                break
+        time.sleep(POLL_SECONDS)
+    database.close()
+    return not stopping()
 
 
 @contextmanager

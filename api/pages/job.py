@@ -16,8 +16,8 @@ from api.schemas.common import MAX_INT
 from api.schemas.jobs import Iteration, Job, PairMatrix
 from api.schemas.webhooks import Webhook
 from certifier.errors import CirisError
+from db import events, pairs
 from db import jobs as rows
-from db import pairs
 from db.session import Database
 from jobs.registry import KINDS
 
@@ -38,6 +38,7 @@ def _job(db: Database, job_id: str) -> dict[str, Any]:
     job = jobs.get_job(job_id, db)
     kind = KINDS[job.kind]
     with db.read() as session:
+        note = events.last(session, job.id, events.NOTE)
         begun, result = pairs.begun(session, job.id), kind.result(session, rows.get(session, job.id))
     # Only the last iteration is looked at: a job may have 100 000 results. The matrix is drawn in the browser.
     last = jobs.get_job_pairs(job_id, db, begun - 1, limit=MAX_INT) if begun else None
@@ -48,6 +49,7 @@ def _job(db: Database, job_id: str) -> dict[str, Any]:
         "elapsed": elapsed(job),
         "scene": scenes.get_scene(job.scene, db),
         "begun": begun,
+        "note": note and note["text"],
         "progress": None if last is None else progress(last),
         "regions": regions.list_regions(db, job=job_id).regions,
         "webhook": _webhook(db, job.id),

@@ -139,7 +139,7 @@ class Event(BaseModel):
     """Describes something that happened to a job."""
 
     seq: int = Field(description="Number of the event within the job: 1, 2, 3 ... It is the event's id in the stream.")
-    kind: str = Field(description="One of job, iteration, pairs, step, region, lost; of a cover also cover and child.")
+    kind: str = Field(description="One of job, iteration, pairs, step, note, region, lost; of a cover also cover and child.")
     data: Document = Field(description="What happened; its keys depend on `kind`.")
     created_at: datetime = Field(description="When it happened.")
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from certifier.errors import CirisError, RegionError
+from certifier.growth.state import GrowthState
 from certifier.growth.whole import REVOKED
+from certifier.model import Scene
 from certifier.seeding.proposal import NO_ROOM, TOO_LONG, mend
 
 DEADLINE = "the deadline was reached"
 """The reason of a growth that had no time left."""
-THIN = "the remaining polytope around the seed is too thin to continue"
+THIN = "the space that remains around the seed is too thin to continue"
 """The reason of a growth that reached a polytope whose interior is too small for doubles. Users did not give that polytope."""
 
 
@@ -18,13 +20,22 @@ def ended_by(error: CirisError, hindrance: str) -> CirisError:
     Args:
         hindrance: as :class:`certifier.growth.state.Start` has it.
     """
-    about_polytope = isinstance(error, RegionError) and error.field == "polytope"
+    about_polytope = isinstance(error, RegionError) and error.field in ("polytope", "start")
     return refusal(hindrance or THIN, late=False) if about_polytope else error
 
 
-def at_deadline(hindrance: str) -> str:
-    """Returns the reason of a growth without a region whose time has run out; more time does not help where something hinders it."""
-    return hindrance or DEADLINE
+def at_deadline(scene: Scene, state: GrowthState | None, told: str) -> str:
+    """Returns the reason of a growth without a region whose time has run out; more time does not help where something hinders it.
+
+    Args:
+        told: what is known to hinder a proposal that is not made yet; "" where nothing is.
+    """
+    hindrance = told if state is None or state.start is None else state.start.hindrance
+    if hindrance or state is None or not state.obstacles:
+        return hindrance or DEADLINE
+    index, worst = max(state.obstacles.items(), key=lambda item: item[1].times)
+    pair, rounds = scene.pairs[index], "1 round" if worst.times == 1 else f"{worst.times} rounds"
+    return f"{DEADLINE}; {pair.a} and {pair.b} were in the way of a region in {rounds}"
 
 
 def refusal(reason: str, late: bool) -> CirisError:
@@ -38,4 +49,7 @@ def refusal(reason: str, late: bool) -> CirisError:
         return CirisError("revoked", reason, hint="grow a region of the new scene from another seed")
     if NO_ROOM in reason or TOO_LONG in reason:
         return CirisError("not_grown", reason, hint=mend(reason))
-    return CirisError("not_grown", reason, hint="allow more time" if late else "try another seed, or look at the pair named")
+    look = "look at the pair named"
+    if not late:
+        return CirisError("not_grown", reason, hint=f"try another seed, or {look}")
+    return CirisError("not_grown", reason, hint="allow more time" if reason == DEADLINE else f"allow more time, or {look}")

@@ -16,6 +16,8 @@ import struct
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Callable
 from multiprocessing.connection import Pipe
 from pathlib import Path
 from typing import Any
@@ -29,6 +31,10 @@ LOADING_S = 600.0
 """Loading may take this long where functions are compiled for the first time, on a machine that does much else."""
 KEEP = b"keep"
 """A message that begins so is no call: it gives a text to keep."""
+TOLD = b"told"
+"""A reply that begins so is no answer yet: it says how far the function is (:mod:`certifier.isolation.telling`)."""
+TELL_S = 1.0
+"""The asking process hears this often that the function still runs."""
 STATUS = struct.Struct("i")
 """This says how a child ended, before its answer: 0, an exit status, or a signal with a minus."""
 AT_ONCE = 2
@@ -39,12 +45,21 @@ while the other one loads.
 """
 KEPT = 4
 """Number of texts that a nursery keeps, those that were named last."""
+Tell = Callable[[dict[str, Any]], None]
+"""Hears how far a function is."""
 _TAIL_BYTES = 2000
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 def run_in_child(
-    function: str, payload: Any, *, timeout_s: float, memory_bytes: int, kept: tuple[str, str] | None = None, fork: bool = True
+    function: str,
+    payload: Any,
+    *,
+    timeout_s: float,
+    memory_bytes: int,
+    kept: tuple[str, str] | None = None,
+    fork: bool = True,
+    tell: Tell | None = None,
 ) -> Any:
     """Returns ``function(payload)``, computed by a child process that is killed when it takes too long or outlives this process.
 
@@ -57,6 +72,7 @@ def run_in_child(
             argument. The nursery calls ``keep`` once for a name. So it reads a scene once for all calls about the scene.
         fork: whether a fork of the nursery computes it. The nursery itself takes half the time where a call takes some milliseconds, and
             what it has read of one call may be seen by the next. If it dies, the next call waits until another one has loaded the module.
+        tell: hears every TELL_S seconds, and when the time is up, what the function has told by then: for each name what came last.
 
     Raises:
         CirisError: the function's own error, of the class it was raised with; or ``child_timeout``, ``child_memory``, or
@@ -67,7 +83,7 @@ def run_in_child(
     call |= {"kept": None if kept is None else kept[0], "fork": fork}
     nursery = _free(module)
     try:
-        status, answer = nursery.ask(encode(call), timeout_s, kept)
+        status, answer = nursery.ask(encode(call), timeout_s, kept, tell)
     except TimeoutError:
         message = f"it took more than {timeout_s:g} s and was stopped{nursery.tail()}"
         raise CirisError("child_timeout", message, hint="ask for less, or try again when the machine has less to do") from None
@@ -87,11 +103,14 @@ def run_in_child(
     return _result(json.loads(answer, object_hook=decode))
 
 
-def prepare(function: str) -> None:
-    """Begins to load what the first call of a function needs, without waiting."""
+def prepare(function: str, wait_s: float = 0.0) -> int:
+    """Begins to load what the first call of a function needs, waits for it at most this long, and returns the id of the process."""
     module = function.partition(":")[0]
     if not _idle.get(module):
         _idle.setdefault(module, []).append(_Nursery(module))
+    nursery = _idle[module][-1]
+    nursery.wait(wait_s)
+    return nursery.process.pid
 
 
 def _free(module: str) -> _Nursery:
@@ -137,7 +156,7 @@ class _Nursery:
                 env={**os.environ, **_ONE_THREAD, "PYTHONPATH": path},
             )
 
-    def ask(self, request: bytes, timeout_s: float, kept: tuple[str, str] | None) -> tuple[int, bytes]:
+    def ask(self, request: bytes, timeout_s: float, kept: tuple[str, str] | None, tell: Tell | None) -> tuple[int, bytes]:
         """Returns how the child ended, and its answer. What is kept is sent first, unless the nursery has it.
 
         The nursery is killed before any error is raised.
@@ -156,22 +175,38 @@ class _Nursery:
                 self._kept, gone = [*self._kept[1 - KEPT :], kept[0]], self._kept[: 1 - KEPT]
                 self._connection.send_bytes(KEEP + encode({"name": kept[0], "text": kept[1], "gone": gone}))
             self._connection.send_bytes(request)
-            reply = self._answer(timeout_s)
+            reply = self._answer(timeout_s, tell)
         except BaseException:
             self.kill()
             raise
         return STATUS.unpack_from(reply)[0], reply[STATUS.size :]
 
-    def _answer(self, timeout_s: float) -> bytes:
-        """Returns what the nursery says next.
+    def wait(self, seconds: float) -> None:
+        """Waits until the process says something, or has ended, but no longer than this."""
+        self._connection.poll(seconds)
+
+    def _answer(self, timeout_s: float, tell: Tell | None = None) -> bytes:
+        """Returns what the nursery says next. Until then, ``tell`` hears how far the function is.
 
         Raises:
             TimeoutError: it has said nothing in time.
             EOFError, ConnectionError: it has ended.
         """
-        if not self._connection.poll(timeout_s):
-            raise TimeoutError
-        return self._connection.recv_bytes()
+        told: dict[str, Any] = {}
+        now = time.monotonic()
+        until, again = now + timeout_s, now + TELL_S
+        while True:
+            if self._connection.poll(max(min(until, again) - now, 0.0)):
+                reply = self._connection.recv_bytes()
+                if not reply.startswith(TOLD):
+                    return reply
+                told |= json.loads(reply.removeprefix(TOLD))
+            now = time.monotonic()
+            if tell is not None and now >= min(until, again):
+                tell(told)
+            if now >= until:
+                raise TimeoutError
+            again = now + TELL_S if now >= again else again
 
     def kill(self) -> None:
         """Ends the process with its children, and the one that was to follow it."""

@@ -25,7 +25,8 @@ from types import ModuleType
 from typing import Any
 
 from certifier.errors import CirisError
-from certifier.isolation.child import ERRORS, KEEP, LOADED, STATUS, decode, encode
+from certifier.isolation import telling
+from certifier.isolation.child import ERRORS, KEEP, LOADED, STATUS, TOLD, decode, encode
 
 _PR_SET_PDEATHSIG = 1
 _MOST_WRITTEN = 2**28
@@ -111,7 +112,7 @@ def _keep(module: ModuleType, name: str, text: str, gone: list[str]) -> None:
 
 
 def _forked(module: ModuleType, connection: Connection, call: dict[str, Any]) -> bytes:
-    """Forks a child for a call, and returns how the child ended and its answer.
+    """Forks a child for a call, passes on what it tells, and returns how it ended and its answer.
 
     Raises:
         EOFError: the asking process is gone, and so is the child.
@@ -131,6 +132,10 @@ def _forked(module: ModuleType, connection: Connection, call: dict[str, Any]) ->
         if not chunk:
             break
         answer += chunk
+        if b"\n" in chunk:  # an answer has no line breaks
+            *told, answer = answer.split(b"\n")
+            for line in told:
+                connection.send_bytes(TOLD + line)
     os.close(reading)
     if gone or len(answer) > _MOST_WRITTEN:
         os.kill(child, signal.SIGKILL)
@@ -143,6 +148,7 @@ def _forked(module: ModuleType, connection: Connection, call: dict[str, Any]) ->
 def _answer(module: ModuleType, call: dict[str, Any], writing: int, nursery: int) -> int:
     """Answers a call in the child, and returns the child's exit status."""
     _confine(call["memory_bytes"], nursery)
+    telling.begin(writing)
     status, reply = _computed(module, call)
     with os.fdopen(writing, "wb") as answer:
         answer.write(reply)

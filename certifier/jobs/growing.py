@@ -35,20 +35,26 @@ def decided(scene: Scene, options: GrowthOptions, state: GrowthState | None, rep
     return advance(scene, state, report)
 
 
-def late(state: GrowthState | None, certified: bool) -> Finish:
+def late(scene: Scene, state: GrowthState | None, certified: bool, told: dict[str, Any]) -> Finish:
     """Returns the end of a growth whose time has run out.
 
     Args:
         certified: whether it has a certified polytope.
+        told: what the child process that makes the proposal has told last.
     """
     if certified:
         return Finish(Outcome.CERTIFIED, DEADLINE)
-    return Finish(Outcome.INCONCLUSIVE, at_deadline("" if state is None or state.start is None else state.start.hindrance))
+    return Finish(Outcome.INCONCLUSIVE, at_deadline(scene, state, told.get("hindrance", "")))
 
 
-def out_of_time() -> CirisError:
-    """Returns the error of a growth whose time has run out before there was a proposal."""
-    return refusal(DEADLINE, late=True)
+def proposing(seconds: float, told: dict[str, Any]) -> str:
+    """Returns how far a proposal is, in words.
+
+    Args:
+        told: what the child process that makes it has told last.
+    """
+    faces = told.get("faces")
+    return f"proposing, {seconds:.0f} s{'' if faces is None else f', {faces} face' + 's' * (faces != 1)}"
 
 
 def failure(state: GrowthState | None, report: Failed) -> CirisError | None:
@@ -66,7 +72,7 @@ def refused(finish: Finish, error: CirisError | None) -> CirisError | None:
     """
     if finish.outcome is Outcome.CERTIFIED:
         return None
-    return error or refusal(finish.reason, late=finish.reason == DEADLINE)
+    return error or refusal(finish.reason, late=finish.reason.startswith(DEADLINE))
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from certifier.growth.state import GrowthState
 from certifier.isolation.child import run_in_child
 from certifier.jobs.driver import drive
 from certifier.jobs.former import Former
-from certifier.jobs.growing import REST, Account, Certified, decided, failure, late, make_region, out_of_time, refused
+from certifier.jobs.growing import REST, Account, Certified, decided, failure, late, make_region, proposing, refused
 from certifier.jobs.pairs import part_certifier
 from certifier.jobs.parallel import side_by_side
 from certifier.jobs.region import Region
@@ -69,6 +69,7 @@ class _Memory:
         made: the candidate that a region was made of last; None before there is one.
         rests_until: no region but the last one is made before this many seconds of the job.
         proposal: what the region is grown from; None before there is a candidate.
+        told: what the child process that makes the proposal has told last.
     """
 
     scene: Scene
@@ -78,6 +79,7 @@ class _Memory:
     deadline_s: float | None = None
     former: Former | None = None
     deliver: Deliver | None = None
+    propose: Callable[[Propose], Proposal] | None = None
     start: float = field(default_factory=lambda: time.perf_counter())
     state: GrowthState | None = None
     action: Action | None = None
@@ -89,6 +91,7 @@ class _Memory:
     made: Candidate | None = None
     rests_until: float = 0.0
     proposal: SampledProposal | None = None
+    told: dict[str, Any] = field(default_factory=dict)
 
     @property
     def seconds(self) -> float:
@@ -128,7 +131,7 @@ class _Memory:
         if isinstance(self.action, Finish):
             return False
         if self.passed >= 1:
-            self.action = late(self.state, self.candidate is not None)
+            self.action = late(self.scene, self.state, self.candidate is not None, self.told)
             return False
         if self.deliver is not None and self.candidate is not self.made and self.seconds >= self.rests_until:
             self.deliver(self.region())
@@ -169,7 +172,7 @@ class _Memory:
                 return self._certify(action)
             if isinstance(action, Propose):
                 self.tell("step", {"kind": "propose", "state": "running", "seconds": None})
-                found = self._proposed(action)
+                found = (self.propose or self._proposed)(action)
                 self.seeding_seconds = found.info["seconds"]
                 self.tell("step", {"kind": "propose", "state": "done", "seconds": self.seeding_seconds})
                 return found
@@ -181,11 +184,19 @@ class _Memory:
     def _proposed(self, action: Propose) -> Proposal:
         """Makes a proposal in a child process, which ends with the deadline: Drake's IRIS does not hear of it, nor of interrupts."""
         left = LONGEST_S if self.deadline_s is None else max(self.deadline_s - self.seconds, 0.0)
-        payload = {"scene": self.scene.to_document(), "seed": action.seed}
+        payload, begun = {"scene": self.scene.to_document(), "seed": action.seed}, self.seconds
+
+        def tell(told: dict[str, Any]) -> None:
+            self.told = told
+            self._tell_note(proposing(self.seconds - begun, told))
+
         try:
-            return stored.value(Proposal, run_in_child(PROPOSE, payload, timeout_s=left, memory_bytes=MEMORY_BYTES))
+            return stored.value(Proposal, run_in_child(PROPOSE, payload, timeout_s=left, memory_bytes=MEMORY_BYTES, tell=tell))
         except CirisError as error:
-            raise out_of_time() if error.code == "child_timeout" else error from None
+            if error.code != "child_timeout":
+                raise
+            finish = late(self.scene, self.state, False, self.told)
+            raise refused(finish, None) or error from None
 
     def _certify(self, action: Certify) -> Outcomes:
         carried = None if self.former is None else self.former.carried
@@ -227,6 +238,7 @@ def grow(
     deadline_s: float | None = None,
     processes: int = 1,
     deliver: Deliver | None = None,
+    propose: Callable[[Propose], Proposal] | None = None,
 ) -> Region:
     """Grows a certified region in this process, or with ``processes`` children of it; the region is the same.
 
@@ -240,7 +252,7 @@ def grow(
     Raises:
         CirisError: no region could be certified; the code is ``not_grown`` or that of the seeding's error.
     """
-    return _grown(_Memory(scene, options, tell, processes, deadline_s, deliver=deliver))
+    return _grown(_Memory(scene, options, tell, processes, deadline_s, deliver=deliver, propose=propose))
 
 
 def recertify(

@@ -64,15 +64,14 @@ def drake_iris(scene: Scene, points: Array, options: SeedOptions) -> tuple[Array
         (C, d, account); the account's keys are guarantee, termination, iterations, epsilon, delta, warnings.
 
     Raises:
-        RegionError: ``seeding_failed`` with Drake's words.
+        RegionError: ``seeding_failed``; Drake's words are the error's cause.
     """
     start = Hyperellipsoid.MakeHypersphere(_START_RADIUS, points[0])
     try:
         region, account = _Iris(scene, options).grow(start, points if len(points) > 1 else None)
     except (RuntimeError, ValueError) as error:
-        raise RegionError(
-            "seeding_failed", f"{options.method}: {error}", field="seed", hint="try another method, or move the seed"
-        ) from error
+        message = f"the method {options.method} found no region around {'the seed' if len(points) == 1 else 'the seed and contain'}"
+        raise RegionError("seeding_failed", message, field="seed", hint="leave the method out, or move the seed") from error
     C, d = region.A()[2 * scene.n :], region.b()[2 * scene.n :]
     norms = np.linalg.norm(C, axis=1)
     C, d = needed_faces(scene, C / norms[:, None], d / norms, points)

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from certifier.isolation.telling import tell
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.ellipsoid import Ellipsoid, inscribed_ellipsoid
@@ -143,6 +144,7 @@ def _faces(contacts: Contacts, points: Array, ellipsoid: Ellipsoid, few: float, 
             break
         C, d = np.array([row for row, _ in faces]), np.array([offset for _, offset in faces])
         found = Polytope(np.concatenate([C, found.C]), np.concatenate([d, found.d]))
+        tell(faces=len(found.d) - len(contacts.limits.d))
     return found
 
 

@@ -11,9 +11,11 @@ from numpy.typing import ArrayLike
 
 from certifier import stored
 from certifier.errors import RegionError
+from certifier.isolation.telling import tell
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee
-from certifier.polytopes.polytope import chebyshev_center, drop_redundant
+from certifier.polytopes.polytope import chebyshev_center
+from certifier.seeding.arm import AT, NEAR, arm
 from certifier.seeding.free import Nearest, check_free
 from certifier.seeding.hindrance import hindrance
 from certifier.seeding.limits import check_limits, off_limits
@@ -50,7 +52,7 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
     Raises:
         RegionError: as :func:`check_seed`, :func:`certifier.seeding.lines.check_lines` and ``polytope.chebyshev_center``;
             ``polytope_shape``; ``center_outside``; ``seed_hindered``; ``seed_cut_off`` when the polytope does not contain the seed and
-            ``contain``; ``seeding_failed`` with Drake's words.
+            ``contain``; ``seeding_failed``.
     """
     start = time.perf_counter()
     method = options.method or Method.IRIS
@@ -66,6 +68,7 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
         center = scene.to_s(off_limits(scene, options.q))
         points = np.concatenate([center[None], contain])
         checked += check_lines(scene, points, checked)
+        tell(hindrance=hindrance(scene, checked))  # in case it takes longer than there is time
         if method is Method.LIMITS:
             C, d = np.zeros((0, scene.n)), np.zeros(0)
             said = {}
@@ -82,8 +85,11 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
             if not (d[:, None] > C @ points.T).all():
                 _refuse_hindered(scene, checked)
     if not (d[:, None] > C @ np.concatenate([center[None], contain]).T).all():
-        problem = f"the polytope of {method} does not contain the seed" + (" and all of contain" if options.contain else "")
-        raise RegionError("seed_cut_off", problem, field="seed", hint="allow fewer iterations, or give points that see one another")
+        kept = "the seed and all of contain" if options.contain else "the seed"
+        if method is Method.POLYTOPE:
+            raise RegionError("seed_cut_off", f"the given polytope does not contain {kept}", field="seed", hint="give one that does")
+        hint = "leave the method out, or give configurations that see one another"
+        raise RegionError("seed_cut_off", f"the method {method} found no region that contains {kept}", field="seed", hint=hint)
     guarantee = said.pop("guarantee", Guarantee.NONE)
     info = {"method": method.value, "guarantee": guarantee.value, "faces": len(d), "seconds": time.perf_counter() - start, **said}
     if known := hindrance(scene, checked):
@@ -102,9 +108,8 @@ def _refuse_hindered(scene: Scene, checked: list[Nearest]) -> None:
 
 
 def warm_up() -> None:
-    """Loads the compiled functions that a proposal needs."""
-    eye = np.eye(2)
-    drop_redundant(Polytope(np.concatenate([eye, -eye]), np.ones(4)))
+    """Loads the compiled functions that a proposal needs, and Drake's libraries, by making one for a small arm."""
+    propose(arm(), SeedOptions(q=AT, contain=(NEAR,), delta=0.5))
 
 
 def propose_in_child(payload: dict[str, Any]) -> dict[str, Any]:

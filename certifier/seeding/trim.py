@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from certifier.isolation.telling import tell
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Pair, Polytope, Scene
 from certifier.polytopes.cutting import cut
@@ -42,6 +43,7 @@ def trimmed(scene: Scene, polytope: Polytope, points: Array, options: SeedOption
     contacts, around = Contacts(wider), polytope
     count = math.ceil(2 * math.log(1 / options.delta) / (options.epsilon * PASSES**2) / EACH)
     for _ in range(options.max_iterations_separating_planes):
+        tell(faces=len(polytope.d) - 2 * scene.n)
         samples = uniform_in_q(polytope, scene, count, EACH, int(rng.integers(2**31))).reshape(-1, scene.n)
         colliding = samples[~contacts.free(samples)]
         if len(colliding) <= PASSES * options.epsilon * len(samples):

@@ -5,12 +5,37 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from certifier.errors import CirisError
+from certifier.growth.refusal import DEADLINE
+from client import demo
 from tests.client.conftest import PLANAR, surroundings
 
 SCRIPT = f"import sys, pathlib, client.demo as demo; demo.SCENE = pathlib.Path({str(PLANAR)!r}); sys.exit(demo.main(['--once']))"
+
+
+def test_a_busy_machine_gets_more_time_before_it_is_told_to_come_back(monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    asked: list[float] = []
+
+    def grow(client: Any, request: dict[str, Any], screen: Any, idempotency_key: str) -> str:
+        asked.append(request["deadline_seconds"])
+        if len(asked) <= late:
+            raise CirisError("not_grown", f"{DEADLINE}; a and b were in the way of a region in 2 rounds")
+        return "a region"
+
+    monkeypatch.setattr(demo.service, "grow", grow)
+    late = 1
+    assert demo._grown(None, {}) == "a region"
+    assert asked == [120, 1200]
+    assert "no region was certified within 120 s" in capsys.readouterr().out
+    asked.clear()
+    late = 2
+    with pytest.raises(CirisError, match="too busy for a first region"):
+        demo._grown(None, {})
+    assert asked == [120, 1200]
 
 
 @pytest.mark.slow

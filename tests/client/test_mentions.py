@@ -16,7 +16,7 @@ from tests.client.mentions import HOLE, Mention, mentions, of_markdown, of_pytho
 
 PARSER: argparse.ArgumentParser = parser()
 BENCHMARKS = benchmarks._parser()
-OTHERS = {"--once": "of ./start"}
+OTHERS = {"--once": "of ./start", "--background": "of `python -m workers`"}
 """Options of other programs that messages name, and whose they are."""
 PROSE = frozenset(
     (

@@ -49,6 +49,22 @@ def test_the_commands_that_ask_a_service_take_names(ciris: Ciris, url: str, name
     assert several.error.startswith(f"--to: the scene has no configuration '{region}'")
 
 
+@pytest.mark.parametrize("suffix", ["json", "yaml"])
+def test_files_with_waypoints_have_names(ciris: Ciris, url: str, named: Scene, tmp_path: Path, suffix: str) -> None:
+    file = tmp_path / f"path.{suffix}"
+    file.write_text(json.dumps({"q": ["home", [0.0], "away"], "t": [0, 1, 2]}))
+    by_name = ciris("path", "slider", "--path", file, "--json", CIRIS_URL=url)
+    file.write_text(json.dumps({"q": [[-0.1], [0.0], [0.15]], "t": [0, 1, 2]}))
+    assert by_name.status == 0
+    assert by_name.json == ciris("path", "slider", "--path", file, "--json", CIRIS_URL=url).json
+    file.write_text(json.dumps({"q": ["home", "nowhere"]}))
+    refused = ciris("path", "slider", "--path", file, CIRIS_URL=url)
+    assert refused.error.startswith("--path[1]: the scene has no configuration 'nowhere'")
+    for rows, problem in ((["home", "away"], "t of"), (["home", {"a": 1}], "file of numbers")):
+        file.write_text(json.dumps({"q": rows, "t": [0]}))
+        assert problem in ciris("path", "slider", "--path", file, CIRIS_URL=url).error
+
+
 def test_the_python_client_takes_names(url: str, named: Scene) -> None:
     with python.connect(url) as service:
         assert service.scene("slider").configurations == {"home": {"model/slide": -0.1}, "away": {"model/slide": 0.15}}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,6 +15,8 @@ from fastapi.testclient import TestClient
 
 from certifier.model import Scene
 from certifier.options import option
+from db import scenes
+from db.session import Database
 from jobs.grow import Grow
 
 REFUSED = "Failed to load resource: the server responded with a status of "
@@ -53,6 +55,20 @@ def test_a_job_is_started_from_the_configuration_that_is_shown(opened: Any, url:
     assert seed["q"] == pytest.approx([0.1, np.deg2rad(-20)])
     assert (seed["method"], job["options"]["cells"]) == ("iris_zo", 64)
     assert job["deadline_at"] is not None
+
+
+def test_the_robot_takes_a_named_configuration_and_keeps_the_joints_that_it_leaves_open(
+    page: Any, url: str, planar: Scene, database: Database
+) -> None:
+    with database.write() as session:
+        scenes.add(
+            session, replace(planar, name="named", configurations={"arm/home": {"arm/joint2": -0.5}, "arm/far": {"arm/joint1": 0.7}})
+        )
+    page.goto(f"{url}/new?scene=named&q=0.1,-0.2")
+    page.get_by_label("Named configuration").select_option("arm/home")
+    page.wait_for_url("**/new?scene=*&q=0.1,-0.5")
+    page.get_by_label("Named configuration").select_option("arm/far")
+    page.wait_for_url("**/new?scene=*&q=0.7,-0.5")
 
 
 def test_what_touches_is_said_live_and_no_job_starts_there(opened: Any, client: TestClient) -> None:

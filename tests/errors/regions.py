@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from certifier.motion.splines import curve
 from certifier.polytopes.polytope import bound_multipliers, chebyshev_center
 from certifier.polytopes.sampling import hit_and_run
 from certifier.proof.motion import Space
+from certifier.scene import load_scene
 from certifier.seeding.options import SeedOptions
 from certifier.seeding.propose import propose
 from certifier.step.step import step
@@ -29,6 +31,8 @@ from tests.certifier.scenes import planar_arm
 from tests.certifier.seeding.test_propose import crane
 from tests.errors.trial import Table
 from tests.scenes import slider
+
+PLANAR = Path(__file__).parents[2] / "examples/planar_2dof/scene.yaml"
 
 
 def seeded(**seed: Any) -> None:
@@ -117,6 +121,9 @@ REGIONS: Table = {
     ("seed_outside_limits", "seed.q[0]"): [lambda t: seeded(q=[2.1, 0])],
     ("seed_outside_window", "seed.q[0]"): [
         lambda t: propose(t.scene(limit='<limit lower="-6" upper="6" effort="1" velocity="1"/>'), SeedOptions(q=(3.1,)))
+    ],
+    ("contain_blocked", "seed.contain"): [
+        lambda t: propose(load_scene(PLANAR), SeedOptions(q=(-1.7072, -1.5029), contain=((1.4046, -2.0546), (-1.3543, 2.3956))))
     ],
     ("contain_blocked", "seed.contain[0]"): [lambda t: seeded(q=[1.5, 0.8], contain=[[1.5, 2.4]])],
     ("missing_option", "seed.q"): [lambda t: seeded(method="box")],

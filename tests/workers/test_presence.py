@@ -12,7 +12,7 @@ import pytest
 
 from certifier.model import Scene
 from db import machine, workers
-from db.leases import _name
+from db.leases import name_of
 from db.models import WorkerRow
 from db.session import database
 from db.states import WorkerState
@@ -38,7 +38,7 @@ def crew(service: Service) -> Iterator[Service]:
 
 def row_of(crew: Service, name: str) -> WorkerRow | None:
     with database().read() as session:
-        return next((row for row in workers.page(session).rows if row.process == _name(crew.pid(name))), None)
+        return next((row for row in workers.page(session).rows if row.process == name_of(crew.pid(name))), None)
 
 
 def seen(crew: Service, name: str, state: WorkerState = WorkerState.RUNNING) -> WorkerRow:
@@ -110,7 +110,7 @@ def test_what_a_paused_worker_leaves_the_others_do(crew: Service, planar: Scene)
     seen(crew, "solve", WorkerState.PAUSED)
     job = submit(planar, box_around(np.zeros(2), 0.1))
     assert ended(job).outcome == "certified"
-    assert {row.parent for row in pairs_of(job)} == {_name(crew.pid("solve-2"))}
+    assert {row.parent for row in pairs_of(job)} == {name_of(crew.pid("solve-2"))}
     ask(crew, "solve", WorkerState.RUNNING)
 
 

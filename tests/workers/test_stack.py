@@ -84,13 +84,6 @@ def test_what_dies_is_started_again_what_is_drained_is_not_and_a_stop_leaves_not
     assert second.returncode == 2
     assert second.stderr.splitlines()[-1].startswith("error: --data: a stack with the data directory")
 
-    before = stack.description["pids"]
-    assert set(before) == {"queue", "control", "solve", "api", "api-2"}
-    os.kill(before["queue"], signal.SIGKILL)
-    os.kill(before["api"], signal.SIGKILL)
-    eventually(lambda: not set(stack.description["pids"].values()) & {before["queue"], before["api"]}, "both are started again")
-    eventually(stack.ready, "the API reaches the queue again", every=ASK_AGAIN_SECONDS)
-
     def ask(path: str, method: str = "GET") -> Any:
         with urllib.request.urlopen(urllib.request.Request(f"{stack.description['url']}{path}", method=method), timeout=20) as answer:
             return json.load(answer)
@@ -98,8 +91,16 @@ def test_what_dies_is_started_again_what_is_drained_is_not_and_a_stop_leaves_not
     def solver() -> str | None:
         return next((worker["id"] for worker in ask("/v1/workers")["workers"] if worker["kind"] == "solve"), None)
 
+    assert solver() is not None, "a stack that says it is up takes work"
+    before = stack.description["pids"]
+    assert set(before) == {"queue", "control", "solve", "api", "api-2"}
+    os.kill(before["queue"], signal.SIGKILL)
+    os.kill(before["api"], signal.SIGKILL)
+    eventually(lambda: not set(stack.description["pids"].values()) & {before["queue"], before["api"]}, "both are started again")
+    eventually(stack.ready, "the API reaches the queue again", every=ASK_AGAIN_SECONDS)
+
     after = stack.description["pids"]
-    drained = eventually(solver, "the worker says that it lives", every=ASK_AGAIN_SECONDS)
+    drained = solver()
     ask(f"/v1/workers/{drained}/drain", "POST")
     eventually(lambda: gone({"solve": after["solve"]}), "it ends")
     time.sleep(3)

@@ -18,12 +18,13 @@ from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.pair.forecast import forecast
+from certifier.seeding.proposal import NO_ROOM
 from db import jobs, leases, pairs, regions, retention, steps, transaction
 from db.models import IterationRow, JobRow, PairRow, ProofRow, StepRow, SubtreesRow
 from db.session import database
 from db.settings import settings
 from db.types import utcnow
-from jobs import admission
+from jobs import admission, growing
 from jobs.scenes import load_scene
 from tests.db.builders import add_iteration
 from tests.scenes import slider
@@ -107,6 +108,34 @@ def test_a_deadline_ends_the_job_with_what_it_has(job_id: str) -> None:
     coordinate(job_id)
     job = job_of(job_id)
     assert (job.state, job.outcome, job.reason) == ("succeeded", Outcome.INCONCLUSIVE, "the deadline was reached")
+
+
+def test_what_hinders_a_proposal_is_told_and_explains_a_deadline(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(growing, "NOTE_S", 0.0)
+    hindrance = f"the seed is 0.03 mm from contact of a and b{NO_ROOM}"
+    job_id = submit(slider(), {"kind": "grow", "seed": {"q": [0.0]}})
+    tell = growing._noting(job_id)
+    tell({})
+    assert "note" not in [event.kind for event in events_of(job_id)], "it waits for a worker"
+    coordinate(job_id)
+    tell({"faces": 31})
+    assert events_of(job_id)[-1].data == {"text": "proposing, 0 s, 31 faces", "part": None, "faces": 31}
+    tell({"faces": 31, "hindrance": hindrance})
+    with database().write() as session:
+        jobs.lock(session, job_id).deadline_at = utcnow() - timedelta(seconds=1)
+    coordinate(job_id)
+    assert (job_of(job_id).error or {})["message"] == hindrance
+    count = len(events_of(job_id))
+    tell({})
+    assert len(events_of(job_id)) == count, "the job has ended"
+
+
+def test_a_cover_hears_of_the_proposals_of_its_regions(job_id: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(growing, "NOTE_S", 0.0)
+    child = submit(slider(), {"kind": "grow", "seed": {"q": [0.0]}}, parent_id=job_id, number=2)
+    coordinate(child)
+    growing._noting(child)({"faces": 1})
+    assert events_of(job_id)[-1].data == {"text": "region 2: proposing, 0 s, 1 face", "part": None}
 
 
 def in_the_way() -> Scene:

@@ -52,7 +52,7 @@ export function said(problem: unknown): string {
   return problem instanceof TypeError ? "The service does not answer." : String(problem);
 }
 
-const KINDS = ["job", "iteration", "pairs", "step", "region", "lost", "cover", "child"];
+const KINDS = ["job", "iteration", "pairs", "step", "note", "region", "lost", "cover", "child"];
 const POLL_MS = 2000;
 /** A stream that says nothing, not even that it is open, for so long after it was asked for is held back by somebody. */
 const OPEN_MS = 4000;

@@ -30,6 +30,7 @@ const KINDS: Record<string, string> = {
   iteration: "iterations",
   pairs: "pairs",
   step: "steps",
+  note: "progress",
   region: "regions",
   lost: "lost work",
   cover: "the cover",
@@ -71,6 +72,10 @@ export function sentence({ kind, data }: Event): string {
       const share = (data.share as { value: number | null } | null)?.value;
       const kept = share == null ? "" : `; it keeps ${(100 * share).toPrecision(3)} % of the proposal, as samples say`;
       return `A region is certified in iteration ${number} (${text("guarantee")})${kept}.`;
+    }
+    case "note": {
+      const told = String(data.text);
+      return `${told.charAt(0).toUpperCase()}${told.slice(1)}.`;
     }
     case "lost":
       return `${data.worker ?? "A process"} no longer works for the job${where("reason", ` (${text("reason")})`)}; its work is open again.`;

@@ -159,7 +159,7 @@ export class JobStore {
     }
     this.syncSoon();
     this.headSoon();
-    if (event.kind !== "pairs") this.slowSoon();
+    if (event.kind !== "pairs" && event.kind !== "note") this.slowSoon();
   }
 
   /** Brings what the events have named up to date. */

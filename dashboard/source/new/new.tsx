@@ -4,7 +4,7 @@ import { get, post, said, ServiceError } from "../common/api";
 import { asText, positions } from "../common/kinematics";
 import { MomentText, touchingOf, useMoment } from "../common/moment";
 import { Robot } from "../common/robot";
-import type { ContactsResponse, Job, SceneModel, ScenePage } from "../common/schema";
+import type { ContactsResponse, Job, SceneDetail, SceneModel, ScenePage } from "../common/schema";
 import { Sliders } from "../common/sliders";
 import { ChooseScene, type Scene } from "./choose";
 import type { Refused } from "./options";
@@ -69,11 +69,19 @@ function Start({ model, parts, asked }: { model: SceneModel; parts: Parts; asked
   const [problem, setProblem] = useState<string | null>(null);
   const [refused, setRefused] = useState<Refused | null>(null);
   const [sending, setSending] = useState(false);
+  const [named, setNamed] = useState<SceneDetail["configurations"]>({});
   const moment = useMoment(model.scene, q);
   const touching = useMemo(() => touchingOf(model, moment), [model, moment]);
   const body = request(model.scene, q, wish, parts);
 
   useEffect(() => history.replaceState(null, "", `?scene=${model.scene}&q=${q.map((value) => Number(value.toFixed(4))).join(",")}`), [model, q.join()]);
+
+  useEffect(() => {
+    get<SceneDetail>(`/v1/scenes/${model.scene}`).then(
+      (scene) => setNamed(scene.configurations),
+      (reason: unknown) => setProblem(said(reason)),
+    );
+  }, [model]);
 
   const search = async (): Promise<void> => {
     const drawn = Array.from({ length: TRIES }, () => model.q_lower.map((low, i) => low + (model.q_upper[i]! - low) * Math.random()));
@@ -121,6 +129,17 @@ function Start({ model, parts, asked }: { model: SceneModel; parts: Parts; asked
           <p class="toolbar">
             <button type="button" onClick={() => setQ(within(model, model.q_star))}>Centre q*</button>
             <button type="button" onClick={() => void search()}>Random free one</button>
+            {Object.keys(named).length > 0 && (
+              <label>
+                Named configuration{" "}
+                <select value="" onChange={(event) => setQ(within(model, names.map((joint, i) => named[event.currentTarget.value]?.[joint] ?? q[i]!)))}>
+                  <option value="">choose …</option>
+                  {Object.keys(named).map((name) => (
+                    <option key={name}>{name}</option>
+                  ))}
+                </select>
+              </label>
+            )}
           </p>
         </div>
       </div>

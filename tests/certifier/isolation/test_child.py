@@ -21,6 +21,7 @@ FUNCTIONS = """
 import ctypes, os, signal, sys, time
 import numpy as np
 from certifier.errors import RegionError
+from certifier.isolation.telling import tell
 
 def twice(payload):
     print("noise on standard output")
@@ -62,6 +63,12 @@ def meet(payload):
         time.sleep(0.01)
     return {"pid": os.getpid()}
 
+def report(payload):
+    tell(done=0, of=2)
+    tell(done=1)
+    time.sleep(payload["seconds"])
+    return {"lines": "a\\nb"}
+
 def fill(payload):
     with open(payload["file"], "wb") as file:
         for _ in range(2**10):
@@ -74,8 +81,8 @@ def call(tmp_path, monkeypatch):
     (tmp_path / "child_functions.py").write_text(FUNCTIONS)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
 
-    def call(name, payload=None, timeout_s=30.0, memory_bytes=2 * GIB, fork=True):
-        return run_in_child(f"child_functions:{name}", payload, timeout_s=timeout_s, memory_bytes=memory_bytes, fork=fork)
+    def call(name, payload=None, timeout_s=30.0, memory_bytes=2 * GIB, fork=True, tell=None):
+        return run_in_child(f"child_functions:{name}", payload, timeout_s=timeout_s, memory_bytes=memory_bytes, fork=fork, tell=tell)
 
     return call
 
@@ -219,6 +226,32 @@ def test_a_file_cannot_grow_without_limit(call, tmp_path):
     with pytest.raises(CirisError, match="File too large"):
         call("fill", {"file": str(tmp_path / "filled")})
     assert (tmp_path / "filled").stat().st_size <= 2**28
+
+
+def test_what_is_told_is_heard_while_the_function_runs_and_when_its_time_is_up(call, monkeypatch):
+    monkeypatch.setattr(child, "TELL_S", 0.05)
+    heard = []
+    assert call("report", {"seconds": 0.5}, tell=heard.append) == {"lines": "a\nb"}
+    assert len(heard) > 2
+    assert heard[-1] == {"done": 1, "of": 2}
+    monkeypatch.setattr(child, "TELL_S", 60.0)
+    heard.clear()
+    with pytest.raises(CirisError) as error:
+        call("report", {"seconds": 60}, timeout_s=1.0, tell=heard.append)
+    assert (error.value.code, heard) == ("child_timeout", [{"done": 1, "of": 2}])
+    assert call("report", {"seconds": 0}) == {"lines": "a\nb"}, "where nobody listens"
+
+
+def test_an_interrupt_while_it_runs_leaves_nothing_behind(call, tmp_path):
+    file = tmp_path / "pids"
+
+    def interrupted(told):
+        if file.exists() and file.read_text():
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        call("sleep", {"file": str(file)}, tell=interrupted)
+    wait_for(lambda: not any(alive(pid) for pid in file.read_text().split()))
 
 
 def alive(pid):

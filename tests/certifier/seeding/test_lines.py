@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,11 +18,14 @@ from hypothesis import strategies as st
 from certifier.errors import RegionError
 from certifier.growth.options import GrowthOptions
 from certifier.jobs.local import grow
+from certifier.scene import load_scene
+from certifier.seeding.free import Clearance
 from certifier.seeding.hindrance import hindrance
 from certifier.seeding.options import Method, SeedOptions
 from certifier.seeding.propose import check_seed, propose
 from tests.certifier.seeding.test_propose import clearance, crane
 
+EXAMPLES = Path(__file__).parents[3] / "examples"
 BEFORE, BESIDE, BEHIND = (1.5, 0.8), (1.8, 0.8), (1.5, 2.3)
 """Configurations before the post and behind it."""
 OPTIONS = {"limits": {}, "box": {"half_width": 0.1}, "iris_np2": {}, "iris_zo": {}}
@@ -106,3 +111,24 @@ def test_a_seed_on_contact_is_left_to_what_is_said_of_seeds() -> None:
     touching = 1.5 - 0.2 - 1e-8
     proposal = propose(scene, SeedOptions(Method.LIMITS, q=(touching, np.pi / 2), contain=((touching - 0.1, np.pi / 2),)))
     assert proposal.info["hindrance"].startswith("the seed is 1e-05 mm from contact")
+
+
+@pytest.mark.parametrize("method", OPTIONS)
+def test_a_contact_in_the_middle_of_points_that_see_one_another_is_refused(method: str) -> None:
+    """Each side of this triangle is free, and Drake finds the post within it."""
+    scene = load_scene(EXAMPLES / "planar_2dof/scene.yaml")
+    corners = np.array([(-1.7072, -1.5029), (1.4046, -2.0546), (-1.3543, 2.3956)])
+    drake, s = Clearance(scene), scene.to_s(corners)
+    for a, b in combinations(s, 2):
+        assert all(drake.free(scene.to_q(x)) for x in a + np.linspace(0, 1, 200)[:, None] * (b - a))
+    seed = {"method": method, "q": corners[0].tolist(), "contain": corners[1:].tolist(), **OPTIONS[method]}
+    with pytest.raises(RegionError) as error:
+        propose(scene, SeedOptions.from_document(seed))
+    assert (error.value.code, error.value.field) == ("contain_blocked", "seed.contain")
+    named = re.fullmatch(r"(\S+) and (\S+) touch at q = (.+), between the configurations that the region has to hold", error.value.message)
+    q = np.array([float(x) for x in named[3].split(",")])
+    distance, pair = drake.least(q)
+    assert distance <= 1e-9
+    assert {pair.a, pair.b} == {named[1], named[2]}
+    weights = np.linalg.solve(np.concatenate([s.T, np.ones((1, 3))]), np.append(scene.to_s(q), 1.0))
+    assert (weights >= -1e-6).all(), "it is between the three"

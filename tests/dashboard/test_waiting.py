@@ -1,0 +1,28 @@
+"""What the page of a job says before the first iteration: what runs, and for how long."""
+
+from __future__ import annotations
+
+import pytest
+
+from api.pages.rendering import templates
+from db.models import JobRow
+from jobs.registry import KINDS
+
+
+@pytest.mark.parametrize(
+    ("kind", "note", "said"),
+    [
+        ("grow", None, "Seeding: looking for a first polytope around the seed."),
+        ("grow", "proposing, 40 s, 31 faces", "Seeding: looking for a first polytope around the seed (proposing, 40 s, 31 faces)."),
+        ("certify", None, "Getting ready to certify."),
+        ("recertify", None, "Getting ready to certify."),
+        ("certify-path", None, "Certifying the motion."),
+        ("cover", "region 0: proposing, 40 s", "Region 0: proposing, 40 s."),
+        ("cover", None, ""),
+    ],
+)
+def test_a_job_that_runs_says_what_it_does(kind: str, note: str | None, said: str) -> None:
+    part = templates.env.get_template(KINDS[kind].template).module
+    text = str(part.waits(JobRow(kind=kind, state="running"), note))
+    assert text.strip().removeprefix('<p class="empty">').removesuffix("</p>") == said
+    assert "Seeding" not in str(part.waits(JobRow(kind=kind, state="queued"), note))
