@@ -23,8 +23,8 @@ MOST_VERTICES = 128
 """The draft allows at most this many."""
 FAR = 0.01
 """Where the hull of a mesh reaches farther beyond the mesh, in metres, the draft offers to decompose the mesh."""
-THRESHOLD = 0.01
-"""The draft offers this threshold, in metres."""
+THRESHOLD = 0.02
+"""The draft offers this threshold, in metres, or half of what the hull reaches beyond the mesh."""
 
 
 def hulls(scene: Scene) -> str:
@@ -73,9 +73,9 @@ def offers(scene: Scene, doubtful: Iterable[Pair]) -> str:
     if solid:
         lines += [
             "# Where that matters, take away the # of decompose and of the mesh: convex parts then stand for it.",
-            "# Every part has pairs of its own, so certifying takes longer.",
+            "# A smaller threshold (metres) makes more parts, each with pairs of its own, and certifying takes longer.",
             "# decompose:",
-            *(f"#   {quoted(name)}: {{threshold: {THRESHOLD:g}}}  # {_said(reach[name])}" for name in solid),
+            *(f"#   {quoted(name)}: {{threshold: {min(THRESHOLD, reach[name] / 2):.2g}}}  # {_said(reach[name])}" for name in solid),
         ]
     for name in found:
         if fault := fault_of(scene, name):

@@ -20,6 +20,8 @@ _IGNORED_SAMPLES = 200
 _STEEP = 50.0
 _HULLS = ("mesh", "convex", "hull", "part")
 """The kinds of shape of which a hull is taken, or a polytope of few vertices around it."""
+_EXACT = 1e-6
+"""A polytope that reaches less than this beyond a hull, in metres, is as good as the hull."""
 _POLYTOPES = "polytopes of few vertices stand for hulls of meshes or parts"
 
 
@@ -55,7 +57,7 @@ def _substituted(scene: Scene) -> list[str]:
     """
     groups: dict[str, list[Geometry]] = {}
     for g in scene.geometries:
-        if g.substitution and (g.inflation or g.shape["kind"] not in _HULLS):
+        if g.substitution and (g.inflation > _EXACT or g.shape["kind"] not in _HULLS):
             groups.setdefault(_POLYTOPES if g.shape["kind"] in _HULLS else g.substitution, []).append(g)
     findings = []
     for what, group in groups.items():

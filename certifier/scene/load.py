@@ -56,6 +56,6 @@ def read_in_child(function: str, payload: dict[str, Any], name: str, timeout_s: 
         raise
     except CirisError as death:
         message = f"reading the models of {name} failed: {death.message}"
-        hint = "look for files that include themselves, broken shapes or meshes"
+        hint = "look for files that include themselves, broken shapes or meshes, and meshes that take long to decompose"
         raise SceneError("scene_model_crash", message, field="directives", hint=hint) from None
     return document

@@ -126,6 +126,7 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
             "directives": scene_file.directives,
             "packages": {name: escaped(root.name) for name, root in scene_file.packages.items()},
             "drake": importlib.metadata.version("drake"),
+            **({"coacd": importlib.metadata.version("coacd")} if scene_file.decompose else {}),
             **recorded(
                 {geometry.name: reached[geometry.name] for geometry in geometries if geometry.name in reached},
                 {geometry.name: faults[geometry.name] for geometry in geometries if geometry.name in faults},

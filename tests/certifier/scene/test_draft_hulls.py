@@ -14,7 +14,7 @@ from tests.certifier.scene.decomposition.solids import angle
 from tests.certifier.scene.test_draft import CARRIED, U
 from tests.certifier.scene.workshop import ARM, LIMIT
 
-OFFER = "# decompose:\n#   arm/base/tub: {threshold: 0.01}"
+OFFER = "# decompose:\n#   arm/base/tub: {threshold: 0.02}"
 
 
 def corner() -> trimesh.Trimesh:
