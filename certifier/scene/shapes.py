@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from certifier.model import Array
-from certifier.scene.decomposition.solid import fault, welded
+from certifier.scene.decomposition.solid import closed, fault, welded
 from certifier.scene.hollow import beyond_mesh
 from certifier.scene.hull import outer
 
@@ -92,7 +92,7 @@ def polytope(shape: dict[str, Any], points: Array, triangles: NDArray[np.int64],
     if shape["kind"] == "convex":
         return Body(vertices, 0.0, shape, f"convex -> {hull}" if inflation else None, inflation)
     beyond = beyond_mesh(points, triangles)
-    return Body(vertices, 0.0, shape, f"mesh -> {hull}", inflation, beyond, fault(*welded(points, triangles)) if beyond else None)
+    return Body(vertices, 0.0, shape, f"mesh -> {hull}", inflation, beyond, fault(*closed(*welded(points, triangles))) if beyond else None)
 
 
 def half_space(center: Array, reach: float) -> Body:

@@ -19,7 +19,7 @@ from scipy.spatial import ConvexHull, QhullError
 from certifier.errors import SceneError
 from certifier.model import Array
 from certifier.scene.decomposition.containment import Part, uncovered
-from certifier.scene.decomposition.solid import fault, inside, solids, welded
+from certifier.scene.decomposition.solid import closed, fault, inside, solids, welded
 from certifier.scene.hollow import beyond_solid
 from certifier.scene.hull import outer
 
@@ -52,7 +52,7 @@ def decompose(payload: dict[str, Any]) -> dict[str, Any]:
     Raises:
         SceneError: ``decompose``, where the mesh bounds no solid, has too many parts, or no parts that hold it are found.
     """
-    points, triangles = welded(payload["points"], payload["triangles"])
+    points, triangles = closed(*welded(payload["points"], payload["triangles"]))
     if problem := fault(points, triangles):
         raise SceneError("decompose", f"the mesh bounds no solid: {problem}", field="decompose", hint=_HULL)
     found = [part for solid in solids(points, triangles) for part in _cut(*welded(points, solid), payload["threshold"])]

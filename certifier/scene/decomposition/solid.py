@@ -18,6 +18,8 @@ _CELLS = 48
 _FLAT = 1e-5
 """A mesh that is thinner than this fraction of its size counts as flat, as for its hull."""
 
+_HOLE = 0.2
+"""A hole is closed if its edges together are at most this fraction of the mesh's length."""
 _TURNS = (1.0, 2**0.5, 3**0.5)
 """The lattice is moved by different fractions along x, y and z, so that its columns miss the diagonals of boxes."""
 
@@ -32,6 +34,63 @@ def welded(points: Array, triangles: NDArray[np.int64]) -> tuple[Array, NDArray[
     return unique[used], number.reshape(-1, 3)
 
 
+def closed(points: Array, triangles: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+    """Returns a welded mesh whose small holes are closed, each by triangles around the middle of its edges.
+
+    What fills a hole is only added to the solid, so the parts can hold more than they have to, and not less.
+    """
+    if len(triangles) == 0:
+        return points, triangles
+    (low, high), balance, _ = _edges(points, triangles)
+    following: dict[int, list[int]] = {}
+    for a, b, net in zip(low.tolist(), high.tolist(), balance.tolist(), strict=True):
+        begin, end = (b, a) if net > 0 else (a, b)
+        following.setdefault(begin, []).extend([end] * abs(net))
+    size, middles, patches = float(np.ptp(points, axis=0).max()), list[Array](), list[tuple[int, int, int]]()
+    for loop in _loops(following):
+        around = points[loop]
+        if np.linalg.norm(np.roll(around, -1, axis=0) - around, axis=1).sum() <= _HOLE * size:
+            patches += [(a, b, len(points) + len(middles)) for a, b in zip(loop, [*loop[1:], loop[0]], strict=True)]
+            middles.append(around.mean(axis=0))
+    if not patches:
+        return points, triangles
+    return np.concatenate([points, middles]), np.concatenate([triangles, patches])
+
+
+def _loops(following: dict[int, list[int]]) -> list[list[int]]:
+    """Returns the simple loops of directed edges that go round in circles, given by the ends of the edges that begin at a point."""
+    loops = []
+    for start in following:
+        while following[start]:
+            way, place = [start], {start: 0}
+            while way:
+                point = following[way[-1]].pop()
+                if point in place:  # the way has come round
+                    loops.append(way[place[point] :])
+                    for left in loops[-1][1:]:
+                        del place[left]
+                    way = way[: place[point] + 1]
+                    if len(way) == 1:
+                        break
+                else:
+                    place[point] = len(way)
+                    way.append(point)
+    return loops
+
+
+def _edges(points: Array, triangles: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Returns the edges of triangles (t, 3), which have e edges.
+
+    These are the numbers of their two points, (2, e), the lower one first; how many more triangles have each from the lower one to the
+    higher one than the other way, (e,); and how many triangles have each, (e,).
+    """
+    edges = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
+    forth = np.where(edges[:, 0] < edges[:, 1], 1, -1)
+    both, number = np.unique(edges.min(axis=1) * len(points) + edges.max(axis=1), return_inverse=True)
+    balance = np.bincount(number, weights=forth).astype(np.int64)
+    return np.array(np.divmod(both, len(points))), balance, np.bincount(number)
+
+
 def fault(points: Array, triangles: NDArray[np.int64]) -> str | None:
     """Returns why a welded mesh bounds no solid, for people; None if it does.
 
@@ -40,11 +99,7 @@ def fault(points: Array, triangles: NDArray[np.int64]) -> str | None:
     """
     if len(triangles) == 0 or _thinnest(points) <= _FLAT * np.ptp(points, axis=0).max():
         return "it is flat"
-    edges = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
-    low, high = edges.min(axis=1), edges.max(axis=1)
-    forth = np.where(edges[:, 0] < edges[:, 1], 1, -1)
-    _, number = np.unique(low * len(points) + high, return_inverse=True)
-    count, balance = np.bincount(number), np.bincount(number, weights=forth)
+    _, balance, count = _edges(points, triangles)
     if (count % 2).any():
         return f"it is open: {int((count % 2).sum())} of its {len(count)} edges have a triangle on one side only"
     if balance.any():

@@ -29,7 +29,7 @@ def angle() -> trimesh.Trimesh:
 
 
 def torus() -> trimesh.Trimesh:
-    return trimesh.creation.torus(0.1, 0.03, major_sections=24, minor_sections=12)
+    return trimesh.creation.torus(0.1, 0.03, major_sections=16, minor_sections=8)
 
 
 def cube(middle: float = 0.0, side: float = 0.2) -> trimesh.Trimesh:

@@ -12,7 +12,6 @@ from certifier.model import Scene
 from certifier.scene.bundle import load_bundle, pack_bundle
 from certifier.scene.contacts import touching
 from certifier.scene.decomposition import parts as asking
-from certifier.scene.load import load_scene
 from certifier.seeding.free import check_free
 from tests.certifier.scene.decomposition.solids import angle
 from tests.certifier.scene.workshop import SCENE, parsed, write
@@ -62,7 +61,7 @@ def test_what_is_between_the_plates_is_free(decomposed: Scene, tmp_path: Path) -
     check_free(decomposed, q, "seed")
 
 
-@pytest.mark.parametrize("pair", ["[arm/hand, room/walls/corner]", "[room/walls/corner, arm/hand/palm]", "[arm/hand, room/walls]"])
+@pytest.mark.parametrize("pair", ["[arm/hand, room/walls/corner]", "[room/walls/corner, arm/hand/palm]"])
 def test_what_ignores_the_mesh_ignores_its_parts(tmp_path: Path, pair: str) -> None:
     scene = parsed(corner(tmp_path, DECOMPOSED + f"ignore: [{{pair: {pair}, reason: known}}]\n"))
     assert not any(name in PARTS for pair in pairs_of(scene) for name in pair)
@@ -103,9 +102,9 @@ def test_a_name_that_another_geometry_has_is_not_given_twice(tmp_path: Path) -> 
     assert names == ["room/walls/corner/part12", "room/walls/corner/part2", "room/walls/corner/part1"]
 
 
-def test_a_bundle_gives_the_scene_that_the_file_gives(tmp_path: Path) -> None:
-    path = corner(tmp_path)
-    assert load_bundle(pack_bundle(path)).hash == load_scene(path).hash
+def test_a_bundle_gives_the_scene_that_the_file_gives(decomposed: Scene, tmp_path: Path) -> None:
+    """Two processes find the same parts, to the last bit."""
+    assert load_bundle(pack_bundle(corner(tmp_path))).hash == decomposed.hash
 
 
 @pytest.mark.parametrize(
