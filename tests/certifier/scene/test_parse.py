@@ -148,7 +148,7 @@ def test_replacements_of_one_kind_are_one_remark(tmp_path):
     )
     more = f'<link name="rack">{rods}</link><joint name="on" type="fixed"><parent link="base"/><child link="rack"/></joint>'
     (said,) = [w for w in parsed(write(tmp_path, more=more)).warnings if "cylinder" in w]
-    assert said == "arm/rack/rod0 and 1 more: cylinder -> circumscribed prism with 12 sides, reaching at most 0.706 mm outside"
+    assert said == "arm/rack/rod1 and 1 more: cylinder -> circumscribed prism with 12 sides, reaching at most 0.706 mm outside"
 
 
 NESTED = ROOM.replace("</link></model>", '</link><model name="shelf"><link name="board"/></model></model>')
