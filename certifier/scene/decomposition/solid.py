@@ -25,11 +25,13 @@ _TURNS = (1.0, 2**0.5, 3**0.5)
 
 
 def welded(points: Array, triangles: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
-    """Returns the mesh with one point for all that are equal, without triangles that have a point twice, and without unused points."""
+    """Returns the mesh with one point for all that are equal, without triangles that are there already or have a point twice."""
     unique, number = np.unique(points + 0.0, axis=0, return_inverse=True)
     corners = number.reshape(-1)[triangles]
     a, b, c = corners.T
     corners = corners[(a != b) & (b != c) & (c != a)]
+    first = corners.argmin(axis=1)[:, None]
+    corners = np.unique(np.take_along_axis(corners, (first + np.arange(3)) % 3, axis=1), axis=0)
     used, number = np.unique(corners, return_inverse=True)
     return unique[used], number.reshape(-1, 3)
 
