@@ -143,8 +143,8 @@ class Scene(ConfigurationSpace):
         q_star: (n,) centre of the parametrisation, radians or metres.
         padding: metres that are added around both geometries of every pair that has no padding of its own.
         warnings: lint findings, sentences for people.
-        provenance: how the scene was made (directives, package roots, Drake's version, how far hulls reach beyond their meshes); not part
-            of the hash.
+        provenance: how the scene was made (directives, package roots, versions of Drake and CoACD, how far hulls reach beyond their
+            meshes, which of these bound no solid); not part of the hash.
         configurations: the named configurations: positions of joints by their full names, radians or metres; not part of the hash.
     """
 

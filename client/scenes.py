@@ -15,10 +15,11 @@ from certifier.kinematics import Kinematics
 from certifier.model import Pair, Scene
 from certifier.pair.forecast import PairCost, forecast
 from certifier.scene.contacts import touching
-from certifier.scene.draft import Part, draft
-from certifier.scene.hollow import CONVEX_PARTS
+from certifier.scene.draft import Draft, Part, draft
+from certifier.scene.hollow import beyond
 from certifier.scene.load import load_scene
 from certifier.seeding.limits import check_limits
+from certifier.verify.decimals import at_most_mm
 from certifier.verify.paddings import paddings
 from certifier.verify.uncovered import unlisted
 from client import output
@@ -58,10 +59,8 @@ def scene_init(args: Namespace) -> int:
     output.print_configurations(scene.configurations)
     for warning in scene.warnings:
         print("warning:", warning, file=sys.stderr)
-    for pair, doubt in drafted.doubtful.items():
-        print(f"warning: {pair.a} and {pair.b} are ignored, but {doubt}: {CONVEX_PARTS}, or take the entry out", file=sys.stderr)
-    for pair in drafted.overlapping:
-        print(f"warning: {pair.a} and {pair.b} overlap at every configuration that was tried: move the weld of one", file=sys.stderr)
+    for warning in _overlaps(drafted):
+        print("warning:", warning, file=sys.stderr)
     if drafted.seed is None:
         print("warning: every configuration that was tried is in collision, so there is no seed", file=sys.stderr)
         return 0
@@ -72,6 +71,18 @@ def scene_init(args: Namespace) -> int:
     print(f"{seed}: a configuration that is free of collision")
     print(f"next: ciris scene check {out}, then ciris grow {out} --local")
     return 0
+
+
+def _overlaps(drafted: Draft) -> list[str]:
+    """Returns what there is to say about pairs that overlap at every configuration that was tried."""
+    doubtful = [pair for pair in drafted.ignored if pair in drafted.doubtful]
+    said = [f"{pair.a} and {pair.b} are ignored, but {drafted.doubtful[pair]}" for pair in doubtful[:1]]
+    said += [f"so are {len(doubtful) - 1} more pairs: the comments at ignore name them"] if len(doubtful) > 1 else []
+    for pair in drafted.overlapping:
+        always = f"{pair.a} and {pair.b} overlap at every configuration that was tried"
+        doubt = drafted.doubtful.get(pair)
+        said.append(f"{always}, but {doubt}: decompose the mesh, or move the weld of one" if doubt else f"{always}: move the weld of one")
+    return said
 
 
 def _standing(text: str) -> Part:
@@ -123,6 +134,9 @@ def scene_check(args: Namespace) -> int:
     output.print_table(("joint", "kind", "lower", "upper", "q*", "q", ""), _joints(scene, q), right="lower upper q* q")
     output.print_configurations(scene.configurations)
     print()
+    if replaced := _replaced(scene):
+        output.print_table(("geometry", "what stands for it", "outside of it", "beyond the mesh"), replaced)
+        print()
     for warning in scene.warnings:
         print(f"warning: {warning}")
     for ignored in scene.ignored:
@@ -165,6 +179,20 @@ def _joints(scene: Scene, q: np.ndarray) -> list[tuple[str, ...]]:
         texts = [f"{scale * x:.{2 if unit == 'deg' else 4}f} {unit}" for x in values]
         rows.append((joint.name, joint.kind.value, *texts, "window" if joint.own_limits is not None else ""))
     return rows
+
+
+def _replaced(scene: Scene) -> list[tuple[str, ...]]:
+    """Returns what stands for shapes that are not certified as they are, and how far it reaches: at most, and at least."""
+    return [
+        (
+            geometry.name,
+            geometry.substitution,
+            at_most_mm(geometry.inflation) if geometry.inflation else "",
+            f"{1000 * far:.3g} mm or more" if (far := beyond(scene, geometry.name)) else "",
+        )
+        for geometry in scene.geometries
+        if geometry.substitution
+    ]
 
 
 def _document(scene: Scene, q: np.ndarray, bad: list[list[str]], costs: list[PairCost]) -> dict[str, object]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from certifier.errors import SceneError
 from certifier.model import Geometry, Scene
+from certifier.scene.known import PART
 
 
 def check_counts(written: int, read: int, scene: Scene) -> None:
@@ -19,7 +20,8 @@ def check_counts(written: int, read: int, scene: Scene) -> None:
     Raises:
         SceneError: ``scene_geometries``.
     """
-    kept = sum(map(_parts, scene.geometries))
+    parts = {geometry.shape["of"] for geometry in scene.geometries if geometry.shape["kind"] == PART}
+    kept = len(parts) + sum(_merged(geometry) for geometry in scene.geometries if geometry.shape["kind"] != PART)
     if written != read:
         message = f"the model files have {written} collision geometries, and Drake has read {read}"
         hint = "find the one that Drake leaves out or makes up, and write it otherwise; docs/scenes.md says what is read of a model"
@@ -29,6 +31,6 @@ def check_counts(written: int, read: int, scene: Scene) -> None:
         raise SceneError("scene_geometries", message, field="directives", hint="report this with the models: it is a fault of ciris")
 
 
-def _parts(geometry: Geometry) -> int:
+def _merged(geometry: Geometry) -> int:
     """Returns how many geometries of Drake's a geometry of the scene stands for."""
     return len(geometry.shape["of"]) if geometry.shape["kind"] == "hull" else 1

@@ -6,10 +6,8 @@ overlap whatever the robot does, as neighbours in a chain often do.
 
 from __future__ import annotations
 
-import json
 import os
 import secrets
-from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -18,14 +16,13 @@ from typing import Any
 from xml.parsers import expat
 
 import numpy as np
-import yaml
 from pydrake.math import RollPitchYaw, RotationMatrix
 
 from certifier.errors import SceneError, close_matches
-from certifier.kinematics import Kinematics
-from certifier.model import WORLD, Array, JointKind, Pair, Scene
+from certifier.model import Array, JointKind, Pair, Scene
 from certifier.scene.contacts import overlaps, touching
-from certifier.scene.hollow import beyond
+from certifier.scene.draft_hulls import doubt, hulls, offers, quoted, vertices
+from certifier.scene.file import SceneFile
 from certifier.scene.load import MEMORY_BYTES, TIMEOUT_S, load_scene, read_in_child
 from certifier.scene.mimics import Mimic, at_rest
 from certifier.scene.packages import packages_of
@@ -36,8 +33,6 @@ TRIED = 200
 """This many random configurations show which pairs always overlap."""
 SEEDS = 2000
 """A free configuration is looked for among this many."""
-MANY_PARTS = 4
-"""Where a body that moves has more polytopes than this, the draft has their hull stand for them."""
 SLIDE = 1.0
 """A slide without limits is drafted to go so far from its limit, in metres, or to either side of 0 if it has neither."""
 _NAMED = {"robot": "name", "model": "name", "mujoco": "model"}
@@ -68,8 +63,8 @@ class Draft:
         text: the scene file.
         seed: (n,) the free configuration that is nearest to q* of those tried; None where all of them are in collision.
         ignored: the pairs of the robot, and of what it carries, that overlap at every configuration tried, which the draft ignores.
-        doubtful: those of them of which perhaps only the replacements overlap, such as hulls, each with a sentence that says so.
         overlapping: other pairs that do. They are not ignored, because something else stands in the wrong place.
+        doubtful: those of both of which perhaps only the replacements overlap, such as hulls, each with a sentence that says so.
         notes: sentences about what was found and chosen.
     """
 
@@ -115,15 +110,15 @@ def draft(
     looked = [packages_of(path, packages, environment or {}, arguments or {}, directory) for path in models.values()]
     found, notes = {name: root for roots, _ in looked for name, root in roots.items()}, [note for _, said in looked for note in said]
     head = _head(out, robot, found, arguments or {}, directory)
-    add = {name: f"  - add_model: {{name: {_quoted(name)}, file: {_quoted(_relative(path, directory))}}}" for name, path in models.items()}
+    add = {name: f"  - add_model: {{name: {quoted(name)}, file: {quoted(_relative(path, directory))}}}" for name, path in models.items()}
     held = _inventory("\n".join([head, *add.values()]), models, directory)
     own = [*parts][: 1 + len(mounts)]
     head = "\n".join([head, *_directives(add, parts, own, held), *_limits(held), *_fix(held)]) + "\n"
     head, said = _with_srdf(head, srdf, robot, own[0], directory)
     notes += said
     scene = _loaded(head, directory)
-    if hulls := _hulls(scene):
-        head += hulls
+    if more := hulls(scene) + vertices(scene, SceneFile.max_vertices):
+        head += more
         scene = _loaded(head, directory)
     random = np.random.default_rng(0).uniform(scene.q_lower, scene.q_upper, (TRIED + SEEDS, scene.n))
     middle = scene.q_star.clip(scene.q_lower, scene.q_upper)
@@ -132,8 +127,8 @@ def draft(
     overlapping = sorted(always, key=lambda pair: (pair.a, pair.b))
     ignored = tuple(pair for pair in overlapping if pair.a.startswith(prefixes) and pair.b.startswith(prefixes))
     others = tuple(pair for pair in overlapping if pair not in ignored)
-    doubtful = {pair: doubt for pair in ignored if (doubt := _doubt(scene, pair, always[pair]))}
-    text = head + _joints(scene) + _ignore(ignored, doubtful, scene)
+    doubtful = {pair: said_of for pair in overlapping if (said_of := doubt(scene, pair, always[pair]))}
+    text = head + offers(scene, doubtful) + _joints(scene) + _ignore(ignored, doubtful, scene)
     seed = _free(scene, middle, random[TRIED:], {*always})
     return Draft(text, _loaded(text, directory), seed, ignored, others, doubtful, tuple(notes))
 
@@ -146,15 +141,6 @@ def _always(scene: Scene, configurations: Iterable[Array]) -> dict[Pair, float]:
     return least
 
 
-def _doubt(scene: Scene, pair: Pair, depth: float) -> str | None:
-    """Returns a sentence where perhaps only what stands for two bodies overlaps: it reaches farther beyond them than they overlap."""
-    reach = {name: beyond(scene, name) + scene.geometry(name).inflation for name in (pair.a, pair.b)}
-    if depth > sum(reach.values()):
-        return None
-    said = " and ".join(f"what stands for {name} reaches {1000 * most:.3g} mm beyond it" for name, most in reach.items() if most)
-    return f"perhaps only their hulls overlap, by {1000 * depth:.3g} mm at least: {said}"
-
-
 def _with_srdf(head: str, given: Path | None, robot: Path, name: str, directory: Path) -> tuple[str, list[str]]:
     """Returns the beginning of a scene file with the robot's SRDF file, if there is one, and sentences that say so.
 
@@ -165,8 +151,8 @@ def _with_srdf(head: str, given: Path | None, robot: Path, name: str, directory:
     if named is None:
         among = sorted(path.name for path in (robot.absolute().parent.parent / "srdf").glob("*.srdf"))
         return head, [f"not used: {', '.join(among)} in ../srdf of the model; name one with --srdf"] if among else []
-    text = f"{head}# Pairs that MoveIt does not check, and named configurations:\nsrdf: {{{_quoted(name)}: "
-    text += f"{_quoted(_relative(named, directory))}}}\n"
+    text = f"{head}# Pairs that MoveIt does not check, and named configurations:\nsrdf: {{{quoted(name)}: "
+    text += f"{quoted(_relative(named, directory))}}}\n"
     try:
         _loaded(text, directory)
     except SceneError as error:
@@ -174,19 +160,6 @@ def _with_srdf(head: str, given: Path | None, robot: Path, name: str, directory:
             raise
         return head, [f"not used: {named}, which is beside the model: {error.message}"]
     return text, [] if given else [f"{named} is beside the model, and the draft uses it"]
-
-
-def _hulls(scene: Scene) -> str:
-    """Returns that hulls stand for the bodies of many parts, each part of which would be a pair with each part of all other bodies."""
-    moved = [joint.child for joint in scene.joints if Kinematics.of(scene).chain(WORLD, joint.child)]
-    parts = Counter(geometry.body for geometry in scene.geometries if geometry.radius == 0)
-    bodies = [body for body in moved if parts[body] > MANY_PARTS]
-    if not bodies:
-        return ""
-    lines = [f"  - {_quoted(body)}  # {parts[body]} parts" for body in bodies]
-    return (
-        "\n".join(["# One hull stands for all parts of each of these. Leave a body out where its hollows matter.", "hulls:", *lines]) + "\n"
-    )
 
 
 def _free(scene: Scene, middle: Array, random: Array, always: set[Pair]) -> Array | None:
@@ -220,13 +193,13 @@ def _unused(name: str, taken: Collection[str]) -> str:
 
 def _head(out: Path, robot: Path, packages: Mapping[str, Path], arguments: Mapping[str, str], directory: Path) -> str:
     name = out.stem if out.stem != "scene" else directory.name
-    lines = [f"# Drafted by ciris scene init for {robot.name}; docs/scenes.md explains every key.", f"name: {_quoted(name)}"]
+    lines = [f"# Drafted by ciris scene init for {robot.name}; docs/scenes.md explains every key.", f"name: {quoted(name)}"]
     if packages:
         lines += ["# Where the packages are that models name as package:// or model://", "packages:"]
-        lines += [f"  {_quoted(package)}: {_quoted(_relative(root, directory))}" for package, root in packages.items()]
+        lines += [f"  {quoted(package)}: {quoted(_relative(root, directory))}" for package, root in packages.items()]
     if arguments:
         lines += ["# What the model's xacro is given", "xacro:"]
-        lines += [f"  {_quoted(key)}: {_quoted(value)}" for key, value in arguments.items()]
+        lines += [f"  {quoted(key)}: {quoted(value)}" for key, value in arguments.items()]
     return "\n".join([*lines, "directives:"])
 
 
@@ -301,8 +274,8 @@ def _weld(root: Mapping[str, Any], parent: str) -> list[str]:
     child, lines = root["body"], []
     if len(inside) > 1:
         child = f"{model}::{'_'.join(inside)}_stands"
-        lines.append(f"  - add_frame: {{name: {_quoted(child)}, X_PF: {{base_frame: {_quoted(root['body'])}}}}}")
-    return [*lines, f"  - add_weld: {{parent: {_quoted(parent)}, child: {_quoted(child)}{pose}}}"]
+        lines.append(f"  - add_frame: {{name: {quoted(child)}, X_PF: {{base_frame: {quoted(root['body'])}}}}}")
+    return [*lines, f"  - add_weld: {{parent: {quoted(parent)}, child: {quoted(child)}{pose}}}"]
 
 
 def _limits(held: Mapping[str, Any]) -> list[str]:
@@ -316,7 +289,7 @@ def _limits(held: Mapping[str, Any]) -> list[str]:
     guessed = {joint: _guess(*limits) for joint, limits in slides.items() if np.isinf(limits).any()}
     if not guessed:
         return []
-    lines = [f"  {_quoted(joint)}: [{lower:.12g}, {upper:.12g}]" for joint, (lower, upper) in guessed.items()]
+    lines = [f"  {quoted(joint)}: [{lower:.12g}, {upper:.12g}]" for joint, (lower, upper) in guessed.items()]
     return ["# The model does not say how far these slide, so this is a guess. Write how far, in metres:", "limits:", *lines]
 
 
@@ -331,7 +304,7 @@ def _fix(held: Mapping[str, Any]) -> list[str]:
     mimics = [Mimic(**mimic) for mimic in held["mimics"]]
     followers = {mimic.follower for mimic in mimics} - {*held["unread"]}
     rest = at_rest(mimics, {joint["name"]: (joint["lower"], joint["upper"]) for joint in held["joints"]})
-    lines = [f"  {_quoted(joint)}: {position:.12g}" for joint, position in rest.items() if joint not in followers]
+    lines = [f"  {quoted(joint)}: {position:.12g}" for joint, position in rest.items() if joint not in followers]
     said = "# Other joints mimic these, so they are held, and the others with them. Choose where, or write swept for all positions at once."
     return [said, "fix:", *lines] if lines else []
 
@@ -375,14 +348,9 @@ def _ignore(pairs: Sequence[Pair], doubtful: Mapping[Pair, str], scene: Scene) -
         why = "neighbours, which overlap" if bodies in neighbours else "they overlap"
         if pair in doubtful:
             lines.append(f"  # Look at these: {doubtful[pair]}.")
+            lines.append("  # To certify the pair, take the entry out, and have the mesh decomposed (above).")
             why += ", perhaps as hulls only,"
         lines.append(
-            f"  - {{pair: [{_quoted(pair.a)}, {_quoted(pair.b)}], reason: {_quoted(f'{why} at every configuration that was tried')}}}"
+            f"  - {{pair: [{quoted(pair.a)}, {quoted(pair.b)}], reason: {quoted(f'{why} at every configuration that was tried')}}}"
         )
     return "\n".join(lines) + "\n"
-
-
-def _quoted(text: str) -> str:
-    """Returns a text as YAML has it, in quotes where it needs them."""
-    plain = all((c.isalnum() and c.isascii()) or c in "_-./" for c in text) and text[:1].isalpha()
-    return text if plain and yaml.safe_load(text) == text else json.dumps(text)

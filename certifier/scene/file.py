@@ -26,6 +26,7 @@ from certifier.scene.paths import beside
 
 KEYS = (
     *("name", "packages", "directives", "srdf", "q_star", "limits", "fix", "configurations", "padding", "ignore", "hulls", "mesh"),
+    "decompose",
     "cylinder_sides",
     "xacro",
 )
@@ -36,6 +37,8 @@ MAX_BYTES = 2**20
 MIN_HULL_VERTICES = 8
 MAX_VERTICES, MAX_SIDES = 512, 128
 """What certifying costs grows with the vertices of a body, so nobody needs more."""
+FINEST = 1e-5
+"""The parts of a mesh may be asked to be so near to it, in metres, and no nearer."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,7 @@ class SceneFile:
         paddings: what the file says of the padding of bodies and of pairs.
         ignore: the pairs that are not certified.
         hulls: the bodies that one hull of all their polytopes stands for.
+        decompose: by mesh geometry, how far its convex parts may reach beyond it, metres.
         max_vertices: greatest number of vertices that stand for a mesh or an ellipsoid.
         xacro: arguments of models that are written in xacro.
         cylinder_sides: number of sides of the prism that stands for a cylinder.
@@ -87,6 +91,7 @@ class SceneFile:
     paddings: Paddings = field(default_factory=Paddings)
     ignore: tuple[IgnoreEntry, ...] = field(default=())
     hulls: tuple[str, ...] = ()
+    decompose: dict[str, float] = field(default_factory=dict)
     max_vertices: int = 32
     cylinder_sides: int = 12
     xacro: dict[str, str | int | float | bool] = field(default_factory=dict)
@@ -138,6 +143,7 @@ def read_scene_file(path: Path) -> SceneFile:
         paddings=paddings,
         ignore=_ignore(values.get("ignore", [])),
         hulls=_hulls(values.get("hulls", [])),
+        decompose=_decompose(values.get("decompose", {})),
         max_vertices=_integer(mesh.get("max_vertices", 32), "mesh.max_vertices", minimum=MIN_HULL_VERTICES, maximum=MAX_VERTICES),
         cylinder_sides=_integer(values.get("cylinder_sides", 12), "cylinder_sides", minimum=3, maximum=MAX_SIDES),
         srdf=_srdf(values.get("srdf", {})),
@@ -389,6 +395,17 @@ def _hulls(value: Any) -> tuple[str, ...]:
     if not isinstance(value, list):
         raise _wrong("hulls", "must be a list of bodies, such as [arm/link_1]")
     return tuple(dict.fromkeys(_string(name, f"hulls[{k}]") for k, name in enumerate(value)))
+
+
+def _decompose(value: Any) -> dict[str, float]:
+    if not isinstance(value, dict):
+        raise _wrong("decompose", "must map names of geometries to how they are decomposed, as in {room/walls/bin: {threshold: 0.01}}")
+    found = {}
+    for name, said in value.items():
+        where = f"decompose.{_name(name, 'decompose')}"
+        threshold = _section(said, where, ("threshold",)).get("threshold")
+        found[name] = _number(threshold, f"{where}.threshold", minimum=FINEST)
+    return found
 
 
 def _arguments(value: Any) -> dict[str, str | int | float | bool]:

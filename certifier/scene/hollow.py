@@ -15,16 +15,20 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from certifier.model import Array, Geometry, Scene
+from certifier.scene.decomposition.solid import wound
 
 _POINTS = 500
 """About this many points are spread over the faces of a hull."""
+_OF_PART = 50
+"""About this many points are spread over the faces of a part."""
 _CLIMBS = 12
 _MOVES = np.eye(3)[[0, 1, 2, 0, 1, 2]] - np.eye(3)[[1, 2, 0, 2, 0, 1]]
 _NOTABLE = 1e-3
 """A hull that reaches less than this fraction of its length beyond the mesh is as good as the mesh."""
-_KEY = "beyond"
-CONVEX_PARTS = "write it as several convex meshes or shapes"
-"""This is what to do about a hull that closes an opening."""
+_KEY, _FAULTS = "beyond", "no_solid"
+_REMEDIES = {"hull": "leave the body out of hulls", "part": "write a smaller threshold, or a larger mesh.max_vertices"}
+"""What to do about a hull that closes an opening, by the kind of shape."""
+_DECOMPOSE = "decompose in the scene file makes convex parts of a mesh"
 
 
 def beyond_mesh(points: Array, triangles: NDArray[np.int64]) -> float:
@@ -43,9 +47,29 @@ def beyond_parts(hull: Array, parts: Sequence[Array], inflation: float) -> float
     return _beyond(_faces(hull), np.concatenate([_faces(part) for part in parts]), inflation)
 
 
-def recorded(found: dict[str, float]) -> dict[str, dict[str, float]]:
-    """Returns what goes into a scene's provenance: by geometry, how far it reaches beyond, metres."""
-    return {_KEY: found} if found else {}
+def beyond_solid(part: Array, points: Array, triangles: NDArray[np.int64]) -> float:
+    """Returns a lower estimate, in metres, of how far the hull of vertices (v, 3) reaches beyond the solid that a closed mesh bounds.
+
+    It is 0 where that is next to nothing.
+
+    Args:
+        points, triangles: (k, 3) and (t, 3), the mesh.
+    """
+    corners = points[triangles]
+    spots = np.array([weights @ triangle for weights, triangle in _spread(_faces(part), _OF_PART)])
+    distances = _Distances(corners)
+    reached = max((distances.of(spot) for spot in spots[~wound(corners, spots)]), default=0.0)
+    return reached if reached > _NOTABLE * float(np.ptp(points, axis=0).max()) else 0.0
+
+
+def recorded(found: dict[str, float], faults: dict[str, str]) -> dict[str, dict[str, float] | dict[str, str]]:
+    """Returns what goes into a scene's provenance.
+
+    Args:
+        found: by geometry, how far it reaches beyond, metres.
+        faults: by geometry, why its mesh bounds no solid.
+    """
+    return ({_KEY: found} if found else {}) | ({_FAULTS: faults} if faults else {})
 
 
 def beyond(scene: Scene, name: str) -> float:
@@ -55,9 +79,21 @@ def beyond(scene: Scene, name: str) -> float:
     return distance if isinstance(distance, float) else 0.0
 
 
+def fault_of(scene: Scene, name: str) -> str | None:
+    """Returns why the mesh of a geometry bounds no solid, for people; None where it does, or where nothing is known."""
+    found = scene.provenance.get(_FAULTS)
+    fault = found.get(name) if isinstance(found, dict) else None
+    return fault if isinstance(fault, str) else None
+
+
 def standing_for(geometry: Geometry) -> str:
     """Returns what a hull stands for, for people."""
     return "its parts" if geometry.shape["kind"] == "hull" else "its mesh"
+
+
+def remedy(geometry: Geometry) -> str:
+    """Returns what to do about a hull that closes an opening, for people."""
+    return _REMEDIES.get(geometry.shape["kind"], _DECOMPOSE)
 
 
 def _faces(points: Array) -> Array:
@@ -79,18 +115,18 @@ def _beyond(hull: Array, triangles: Array, slack: float) -> float:
     if not len(triangles):
         return 0.0
     distances = _Distances(triangles)
-    farthest, reached = max(((point, distances.of(point[0] @ point[1])) for point in _spread(hull)), key=lambda found: found[1])
+    farthest, reached = max(((point, distances.of(point[0] @ point[1])) for point in _spread(hull, _POINTS)), key=lambda found: found[1])
     reached = _climbed(*farthest, reached, distances) - slack
     return reached if reached > _NOTABLE * float(np.ptp(hull.reshape(-1, 3), axis=0).max()) else 0.0
 
 
-def _spread(triangles: Array) -> list[tuple[Array, Array]]:
-    """Returns points of the largest of triangles (t, 3, 3), by their areas, on a lattice in each: weights (3,), and the triangle."""
+def _spread(triangles: Array, count: int) -> list[tuple[Array, Array]]:
+    """Returns about ``count`` points of the largest of triangles (t, 3, 3), on a lattice in each: weights (3,), and the triangle."""
     areas = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1) / 2
     whole = areas.sum() or 1.0
     found = []
-    for k in np.argsort(areas)[-_POINTS:]:
-        steps = max(1, int(np.ceil(np.sqrt(2 * _POINTS * areas[k] / whole))))
+    for k in np.argsort(areas)[-count:]:
+        steps = max(1, int(np.ceil(np.sqrt(2 * count * areas[k] / whole))))
         lattice = [((i + 1 / 3) / steps, (j + 1 / 3) / steps) for i in range(steps) for j in range(steps - i)]
         found += [(np.array([1 - x - y, x, y]), triangles[k]) for x, y in lattice]
     return found

@@ -76,37 +76,50 @@ def outer(points: Array, max_vertices: int) -> tuple[Array, float, int]:
 
 def contains(vertices: Array, points: Array, tolerance: float = 0.0) -> bool:
     """Returns whether every one of points (k, 3) is in the hull of vertices (v, 3), up to a tolerance in metres, whatever rounding does."""
-    return bool(_depths(vertices, points).min() >= -tolerance)
+    return bool(depths(*inner(vertices), points).min() >= -tolerance)
 
 
 def _is_hull(vertices: Array, points: Array) -> bool:
     """Returns whether every point is one of the vertices, which are among the points, or is inside their hull beyond doubt."""
     try:
-        doubtful = points[_depths(vertices, points) < 0]
+        doubtful = points[depths(*inner(vertices), points) < 0]
     except QhullError:
         doubtful = points
     own = set(map(tuple, vertices.tolist()))
     return all(tuple(point) in own for point in doubtful.tolist())
 
 
-def _depths(vertices: Array, points: Array) -> Array:
-    """Returns how deep points (k, 3) are in the hull of vertices (v, 3), metres, (k,).
+def depths(normals: Array, offsets: Array, points: Array) -> Array:
+    """Returns how far inside of half-spaces points (k, 3) are at least, whatever rounding does, metres, (k,).
 
-    A point is inside beyond doubt where its depth is not negative, for this reason. Qhull's facets are triangles that close a surface
-    within the hull. Their planes are not quite through their corners: the deepest corner is ``slack`` below its plane, and every point of
-    the triangles is at most that far below. The way from the middle to a point outside crosses a triangle. So if the middle and a point
-    are both farther than ``slack`` below all planes, the point is inside.
+    Args:
+        normals, offsets: (h, 3) unit normals n and (h,) offsets o of the half-spaces n'x + o <= 0.
+    """
+    size = max(1, _PRODUCTS // len(normals))
+    chunks = (points[k : k + size] for k in range(0, len(points), size))
+    found = np.concatenate([-(chunk @ normals.T + offsets).max(axis=1) for chunk in chunks])
+    return found - _ROUNDING * float(np.abs(points).max())
+
+
+def inner(vertices: Array) -> tuple[Array, Array]:
+    """Returns half-spaces n'x + o <= 0, (h, 3) and (h,), whose common part is in the hull of vertices (v, 3) beyond doubt.
+
+    Qhull's facets are triangles that close a surface within the hull. Their planes are not quite through their corners: the deepest corner
+    of a triangle is its ``slack`` below its plane, and every point of it is at most that far below. The way from the middle to a point
+    outside crosses a triangle. So if the middle and a point are both farther below every plane than its slack, the point is inside.
+
+    Where the middle is not, the offsets are infinite, and no point is in the half-spaces.
+
+    Raises:
+        QhullError: the hull is flat.
     """
     hull = ConvexHull(vertices)
     normals, offsets = hull.equations[:, :3], hull.equations[:, 3]
     corners = vertices[hull.simplices]
-    slack = -(np.einsum("fij,fj->fi", corners, normals) + offsets[:, None]).min()
-    margin = max(slack, 0.0) + _ROUNDING * max(np.abs(vertices).max(), np.abs(points).max())
-    size = max(1, _PRODUCTS // len(normals))
-    chunks = (points[k : k + size] for k in range(0, len(points), size))
-    depths = np.concatenate([-(chunk @ normals.T + offsets).max(axis=1) for chunk in chunks]) - margin
-    middle = -(normals @ vertices.mean(axis=0) + offsets).max() - margin
-    return depths if middle > 0 else np.minimum(depths, middle)
+    slack = -(np.einsum("fij,fj->fi", corners, normals) + offsets[:, None]).min(axis=1)
+    offsets = offsets + np.maximum(slack, 0.0) + _ROUNDING * float(np.abs(vertices).max())
+    middle = (normals @ vertices.mean(axis=0) + offsets).max()
+    return normals, offsets if middle < 0 else np.full_like(offsets, np.inf)
 
 
 def thickened(points: Array) -> Array:

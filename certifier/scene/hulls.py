@@ -14,22 +14,24 @@ from certifier.errors import SceneError, close_matches
 from certifier.model import Geometry
 from certifier.scene.hollow import beyond_parts
 from certifier.scene.hull import outer
+from certifier.scene.known import PART
 from certifier.scene.names import Register
 
 _Key = TypeVar("_Key")
 
 
 def with_hulls(
-    geometries: Mapping[_Key, Geometry],
+    geometries: Mapping[_Key, tuple[Geometry, ...]],
     hulls: Sequence[str],
     bodies: Collection[str],
     max_vertices: int,
     names: Register,
     reached: dict[str, float],
-) -> dict[_Key, Geometry]:
+) -> dict[_Key, tuple[Geometry, ...]]:
     """Returns the geometries with one hull in the place of all polytopes of each body named; balls and capsules remain.
 
     Args:
+        geometries: what stands for each geometry of Drake's.
         hulls: names of bodies, as the scene file has them.
         bodies: all bodies of the scene.
         max_vertices: a hull has at most this many vertices; where it would have more, a polytope around it takes its place.
@@ -37,20 +39,24 @@ def with_hulls(
         reached: gets the names of hulls that reach beyond their parts, and how far, in metres.
 
     Raises:
-        SceneError: ``unknown_name``; ``few_parts`` for a body with fewer than two polytopes; ``hull``, as :func:`outer`.
+        SceneError: ``unknown_name``; ``few_parts`` for a body with fewer than two polytopes; ``scene_field`` for one with a mesh that is
+            decomposed; ``hull``, as :func:`outer`.
     """
     found = dict(geometries)
     for k, body in enumerate(hulls):
         if body not in bodies:
             hint = close_matches(body, list(bodies)) or "`ciris scene check` lists the geometries, whose names begin with their bodies"
             raise SceneError("unknown_name", f"the scene has no body {body!r}", field=f"hulls[{k}]", hint=hint)
-        parts = {key: geometry for key, geometry in geometries.items() if geometry.body == body and geometry.radius == 0}
+        parts = {key: geometry for key, (geometry, *_) in geometries.items() if geometry.body == body and geometry.radius == 0}
+        if part := next((part for part in parts.values() if part.shape["kind"] == PART), None):
+            message = f"{body} has {part.shape['of']}, which is decomposed, and one hull would stand for the parts"
+            raise SceneError("scene_field", message, field=f"hulls[{k}]", hint="leave out the one or the other")
         if len(parts) < 2:
             message = f"{body} must have two or more boxes, cylinders and meshes; it has {len(parts)}"
             raise SceneError("few_parts", message, field=f"hulls[{k}]", hint="leave it out of hulls")
         name = names.give(names.unused(f"{body}/hull"), "hull", f"the hull of {body}")
         hull = _hull(name, list(parts.values()), max_vertices)
-        found |= dict.fromkeys(parts, hull)
+        found |= dict.fromkeys(parts, (hull,))
         beyond = beyond_parts(hull.vertices, [part.vertices for part in parts.values()], hull.inflation)
         if beyond := max(beyond, *(reached.get(part.name, 0.0) for part in parts.values())):
             reached[name] = beyond

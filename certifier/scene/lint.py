@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from certifier.model import Array, Geometry, Pair, Scene
 from certifier.scene.contacts import touching
-from certifier.scene.hollow import CONVEX_PARTS, beyond, standing_for
+from certifier.scene.hollow import beyond, remedy, standing_for
 from certifier.scene.tree import Tree
 from certifier.scene.units import units
 from certifier.verify.decimals import at_most_mm
@@ -18,6 +18,11 @@ from certifier.verify.decimals import at_most_mm
 _SAMPLES = 40
 _IGNORED_SAMPLES = 200
 _STEEP = 50.0
+_HULLS = ("mesh", "convex", "hull", "part")
+"""The kinds of shape of which a hull is taken, or a polytope of few vertices around it."""
+_EXACT = 1e-6
+"""A polytope that reaches less than this beyond a hull, in metres, is as good as the hull."""
+_POLYTOPES = "polytopes of few vertices stand for hulls of meshes or parts"
 
 
 def findings(
@@ -46,29 +51,43 @@ def findings(
 
 
 def _substituted(scene: Scene) -> list[str]:
-    """Returns a finding about every kind of replacement, such as a hull of 64 vertices, and the geometries that it was made for."""
+    """Returns a finding about every kind of replacement, such as a prism of 12 sides, and the geometries that it was made for.
+
+    A hull that is exactly that of its mesh is no finding here: :func:`_hollow` says where it matters.
+    """
     groups: dict[str, list[Geometry]] = {}
     for g in scene.geometries:
-        if g.substitution:
-            groups.setdefault(g.substitution, []).append(g)
+        if g.substitution and (g.inflation > _EXACT or g.shape["kind"] not in _HULLS):
+            groups.setdefault(_POLYTOPES if g.shape["kind"] in _HULLS else g.substitution, []).append(g)
     findings = []
-    for substitution, group in groups.items():
-        others = f" and {len(group) - 1} more" if len(group) > 1 else ""
+    for what, group in groups.items():
         inflation = max(g.inflation for g in group)
-        of = " of that hull" if "around its hull" in substitution else ""
-        reach = f", reaching at most {at_most_mm(inflation)} outside{of}" if inflation else ""
-        findings.append(f"{group[0].name}{others}: {substitution}{reach}")
+        behind = "" if what != _POLYTOPES else " of these; a larger mesh.max_vertices makes it less"
+        reach = f", reaching at most {at_most_mm(inflation)} outside{behind}" if inflation else ""
+        findings.append(f"{_several(group, lambda g: g.inflation)}: {what}{reach}")
     return findings
 
 
 def _hollow(scene: Scene) -> list[str]:
-    """Returns a finding about every hull that reaches notably beyond what it stands for."""
-    return [
-        f"{g.name}: the hull reaches at least {1000 * distance:.3g} mm beyond {standing_for(g)}, which is not convex, and closes its "
-        f"openings: {CONVEX_PARTS}, where that matters"
-        for g in scene.geometries
-        if (distance := beyond(scene, g.name))
-    ]
+    """Returns a finding about every kind of hull that reaches notably beyond what it stands for."""
+    groups: dict[str, list[Geometry]] = {}
+    for g in scene.geometries:
+        if beyond(scene, g.name):
+            groups.setdefault(remedy(g), []).append(g)
+    findings = []
+    for what, group in groups.items():
+        most = f"at least {1000 * max(beyond(scene, g.name) for g in group):.3g} mm"
+        said = f"the hull reaches {most} beyond {standing_for(group[0])}, which is not convex, and closes its openings"
+        if len(group) > 1:
+            said = f"the hulls reach beyond what they stand for, the first by {most}, and close openings"
+        findings.append(f"{_several(group, lambda g: beyond(scene, g.name))}: {said}: {what}, where that matters")
+    return findings
+
+
+def _several(group: list[Geometry], size: Callable[[Geometry], float]) -> str:
+    """Returns the name of the geometry of a group for which a size is largest, and how many others there are."""
+    first = max(group, key=lambda g: round(size(g), 6))
+    return f"{first.name} and {len(group) - 1} more" if len(group) > 1 else first.name
 
 
 def _windows(scene: Scene) -> list[str]:

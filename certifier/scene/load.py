@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from certifier.errors import CirisError, SceneError
 from certifier.isolation.child import run_in_child
-from certifier.scene.file import existing
+from certifier.scene.file import existing, read_scene_file
 
 if TYPE_CHECKING:  # The command packs scene files without numpy, which the model needs.
     from certifier.model import Scene
 
 TIMEOUT_S, MEMORY_BYTES = 60.0, 4 * 2**30
+DECOMPOSE_S = 120.0
+"""Decomposing a mesh may take so long besides."""
 
 
 def load_scene(path: str | Path, *, timeout_s: float = TIMEOUT_S, memory_bytes: int = MEMORY_BYTES) -> Scene:
@@ -21,7 +23,7 @@ def load_scene(path: str | Path, *, timeout_s: float = TIMEOUT_S, memory_bytes: 
 
     Args:
         path: the scene file (docs/scenes.md); relative paths in it start at its directory.
-        timeout_s: wall-clock limit of the child, seconds.
+        timeout_s: wall-clock limit of the child, seconds, besides ``DECOMPOSE_S`` for every mesh that is decomposed.
         memory_bytes: memory limit of the child, bytes.
 
     Raises:
@@ -30,6 +32,7 @@ def load_scene(path: str | Path, *, timeout_s: float = TIMEOUT_S, memory_bytes: 
     from certifier.model import Scene
 
     path = existing(path)
+    timeout_s += DECOMPOSE_S * len(read_scene_file(path).decompose)
     document = read_in_child("certifier.scene.parse:parse", {"path": str(path)}, path.name, timeout_s, memory_bytes)
     return Scene.from_document(document)
 
@@ -53,6 +56,6 @@ def read_in_child(function: str, payload: dict[str, Any], name: str, timeout_s: 
         raise
     except CirisError as death:
         message = f"reading the models of {name} failed: {death.message}"
-        hint = "look for files that include themselves, broken shapes or meshes"
+        hint = "look for files that include themselves, broken shapes or meshes, and meshes that take long to decompose"
         raise SceneError("scene_model_crash", message, field="directives", hint=hint) from None
     return document

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from certifier.errors import SceneError, close_matches
-from certifier.model import WORLD, Geometry, Pair
+from certifier.model import Geometry, Pair
+from certifier.scene.known import check_known, names_of
 
 
 @dataclass(frozen=True)
@@ -35,23 +35,24 @@ class Paddings:
         """Returns the pairs with their paddings, and a warning for everything that concerns no pair.
 
         The first entry that names a pair counts. Without one, it is the larger padding of its two geometries; what is said of a geometry
-        comes before what is said of its body.
+        comes before what is said of the mesh that it is a part of, and this before what is said of its body.
 
         Raises:
             SceneError: ``unknown_name``, for what is neither a body nor a geometry.
         """
-        body = {geometry.name: geometry.body for geometry in geometries}
+        names = {geometry.name: names_of(geometry) for geometry in geometries}
+        known = [*bodies, *(name for several in names.values() for name in several)]
         named = [(name, f"padding.bodies.{name}") for name in self.bodies]
         named += [(name, f"{entry.field}[{k}]") for entry in self.pairs for k, name in enumerate((entry.a, entry.b))]
         for name, where in named:
-            check_known(name, [*bodies, *body], where)
+            check_known(name, known, where)
         first = {frozenset((entry.a, entry.b)): entry for entry in reversed(self.pairs)}
         unused = {f"padding.bodies.{name}: {name} has no pair to certify": name for name in self.bodies}
         used: set[str] = set()
         found = []
         for pair in pairs:
-            sides = [(name, body[name]) for name in (pair.a, pair.b)]
-            entries = [first[names] for a in sides[0] for b in sides[1] if (names := frozenset((a, b))) in first]
+            sides = [names[name] for name in (pair.a, pair.b)]
+            entries = [first[both] for a in sides[0] for b in sides[1] if (both := frozenset((a, b))) in first]
             own = [next((name for name in side if name in self.bodies), None) for side in sides]
             used |= {name for name in own if name is not None}
             if entries:
@@ -63,15 +64,3 @@ class Paddings:
         warnings = [said for said, name in unused.items() if name not in used]
         warnings += [f"{e.field}: {e.a} and {e.b} have no pair to certify" for e in self.pairs if e.field not in used]
         return tuple(found), warnings
-
-
-def check_known(name: str, known: Sequence[str], where: str) -> None:
-    """Refuses a name that is neither a body nor a geometry.
-
-    Raises:
-        SceneError: ``unknown_name``.
-    """
-    if name not in known:
-        message, hint = f"{name!r} is neither a body nor a geometry of the scene", "`ciris scene show` and `scene check` list them"
-        others = [other for other in known if other != WORLD]
-        raise SceneError("unknown_name", message, field=where, hint=close_matches(name, others) or hint)

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from certifier.model import Geometry, Ignored, Pair
 from certifier.scene.file import IgnoreEntry
-from certifier.scene.paddings import check_known
+from certifier.scene.known import check_known, names_of
 from certifier.scene.tree import Tree
 
 
@@ -20,7 +20,7 @@ def pairs(
     """Splits the candidates that have a moving joint between their bodies into those to certify and those ignored.
 
     Args:
-        ignore: the entries of the scene file, which come first.
+        ignore: the entries of the scene file, which come first. The name of a mesh that is decomposed means all of its parts.
         described: entries of SRDF files. Many of them concern no pair, because a filter hides it or a link has no geometry.
 
     Returns:
@@ -30,7 +30,8 @@ def pairs(
         SceneError: an ignore entry names neither a body nor a geometry.
     """
     body = {g.name: g.body for g in geometries}
-    known = [*tree.bodies, *body]
+    named = {g.name: names_of(g) for g in geometries}
+    known = list(dict.fromkeys([*tree.bodies, *(name for names in named.values() for name in names)]))
     for entry in ignore:
         for k, name in enumerate((entry.a, entry.b)):
             check_known(name, known, f"{entry.field}[{k}]")
@@ -43,8 +44,8 @@ def pairs(
     for a, b in sorted({(min(candidate), max(candidate)) for candidate in candidates}):
         if tree.group[body[a]] == tree.group[body[b]]:
             continue
-        named = (frozenset((name_a, name_b)) for name_a in (a, body[a]) for name_b in (b, body[b]))
-        match = min((first[names] for names in named if names in first), key=place.__getitem__, default=None)
+        both = (frozenset((name_a, name_b)) for name_a in named[a] for name_b in named[b])
+        match = min((first[names] for names in both if names in first), key=place.__getitem__, default=None)
         if match is None:
             wanted.append(Pair(a, b))
         else:

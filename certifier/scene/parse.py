@@ -50,6 +50,7 @@ from certifier.scene import shapes
 from certifier.scene.census import check_counts
 from certifier.scene.configurations import own_configurations, srdf_configurations
 from certifier.scene.copies import Copies
+from certifier.scene.decomposition.parts import Decomposition
 from certifier.scene.file import SceneFile, read_scene_file
 from certifier.scene.hollow import recorded
 from certifier.scene.hulls import with_hulls
@@ -106,11 +107,13 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     limits = others_of(scene_file.limits, sweeps, every)
     joints, q_star = centered(narrowed(held(every, welded), limits), scene_file.q_star)
     tree = Tree(joints, list(names.bodies))
-    reached: dict[str, float] = {}
-    parts = _geometries(scene_file, strict, copies, plant, inspector, tree, Sweeper(tree, sweeps, scene_file.max_vertices), names, reached)
-    by_id = with_hulls(parts, scene_file.hulls, tree.bodies, scene_file.max_vertices, names.register, reached)
-    candidates = list(dict.fromkeys((by_id[a].name, by_id[b].name) for a, b in inspector.GetCollisionCandidates()))
-    geometries = tuple({id(geometry): geometry for geometry in by_id.values()}.values())
+    reached, faults = dict[str, float](), dict[str, str]()
+    sweeper = Sweeper(tree, sweeps, scene_file.max_vertices)
+    read = _geometries(scene_file, strict, copies, plant, inspector, tree, sweeper, names, reached, faults)
+    by_id = with_hulls(read, scene_file.hulls, tree.bodies, scene_file.max_vertices, names.register, reached)
+    touching = ((one, other) for a, b in inspector.GetCollisionCandidates() for one in by_id[a] for other in by_id[b])
+    candidates = list(dict.fromkeys((one.name, other.name) for one, other in touching))
+    geometries = tuple({id(geometry): geometry for several in by_id.values() for geometry in several}.values())
     for geometry in geometries:
         _check_hull(geometry)
     semantics = read_semantics(scene_file, tree.bodies)
@@ -130,7 +133,11 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
             "directives": scene_file.directives,
             "packages": {name: escaped(root.name) for name, root in scene_file.packages.items()},
             "drake": importlib.metadata.version("drake"),
-            **recorded({geometry.name: reached[geometry.name] for geometry in geometries if geometry.name in reached}),
+            **({"coacd": importlib.metadata.version("coacd")} if scene_file.decompose else {}),
+            **recorded(
+                {geometry.name: reached[geometry.name] for geometry in geometries if geometry.name in reached},
+                {geometry.name: faults[geometry.name] for geometry in geometries if geometry.name in faults},
+            ),
         },
     )
     check_counts(written, inspector.NumGeometriesWithRole(Role.kProximity), scene)
@@ -294,25 +301,35 @@ def _geometries(
     sweeper: Sweeper,
     names: Names,
     reached: dict[str, float],
-) -> dict[GeometryId, Geometry]:
-    """Returns every geometry of the proximity role, half-spaces last because their size depends on the reach of the others.
+    faults: dict[str, str],
+) -> dict[GeometryId, tuple[Geometry, ...]]:
+    """Returns what stands for every geometry of the proximity role: one geometry, or the parts of a mesh.
+
+    Half-spaces come last, because their size depends on the reach of the others.
 
     Args:
         reached: gets the names of hulls that reach beyond their meshes, and how far, in metres.
+        faults: gets the names of those whose meshes bound no solid, and why.
     """
-    found: dict[GeometryId, Geometry] = {}
+    found: dict[GeometryId, tuple[Geometry, ...]] = {}
     half_spaces = []
-    for i in inspector.GetAllGeometryIds(Role.kProximity):
+    decomposition = Decomposition(scene_file, names.register)
+    every = inspector.GetAllGeometryIds(Role.kProximity)
+    for i in every:
         name, body_name = names.geometry(i), names.body(plant.GetBodyFromFrameId(inspector.GetFrameId(i)))
-        if isinstance(inspector.GetShape(i), HalfSpace):
+        shape, X_BG = inspector.GetShape(i), inspector.GetPoseInFrame(i)
+        if isinstance(shape, HalfSpace):
             half_spaces.append((i, name, body_name))
+            continue
+        if decomposition.wanted(name) and isinstance(shape, Convex | Mesh):
+            several = decomposition.parts(name, _said(shape, copies), *_mesh(shape, strict, copies))
         else:
-            X_BG = inspector.GetPoseInFrame(i)
-            convex = _convex(inspector.GetShape(i), name, scene_file, strict, copies)
-            found[i] = sweeper.around(_placed(name, body_name, convex, X_BG))
-            if convex.beyond:
-                reached[name] = convex.beyond
-    reach = tree.reach(list(found.values()), scene_file.largest_padding)
+            several = {name: _convex(shape, name, scene_file, strict, copies)}
+        found[i] = tuple(sweeper.around(_placed(own, body_name, convex, X_BG)) for own, convex in several.items())
+        reached |= {own: convex.beyond for own, convex in several.items() if convex.beyond}
+        faults |= {own: convex.fault for own, convex in several.items() if convex.fault}
+    decomposition.check([names.geometry(i) for i in every])
+    reach = tree.reach([geometry for several in found.values() for geometry in several], scene_file.largest_padding)
     for i, name, body_name in half_spaces:
         if body_name not in tree.anchored:
             message = f"geometry {name} is a half-space on a body that moves"
@@ -320,7 +337,7 @@ def _geometries(
         sweeper.check_half_space(name, body_name)
         X_BG = inspector.GetPoseInFrame(i)
         center = (RigidTransform(tree.anchored[body_name]) @ X_BG).inverse().translation()
-        found[i] = _placed(name, body_name, shapes.half_space(center, reach), X_BG)
+        found[i] = (_placed(name, body_name, shapes.half_space(center, reach), X_BG),)
     return found
 
 
@@ -358,17 +375,17 @@ def _convex(shape: Shape, name: str, scene_file: SceneFile, strict: StrictReader
         case Ellipsoid():
             return shapes.ellipsoid((shape.a(), shape.b(), shape.c()), scene_file.max_vertices)
         case Convex() | Mesh():
-            file = copies.original(Path(shape.source().description()))
-            said = {
-                "kind": type(shape).__name__.lower(),
-                "file": escaped(file.name),
-                "scale": shape.scale3().tolist(),
-            }
             points, triangles = _mesh(shape, strict, copies)
-            return shapes.polytope(said, points, triangles, scene_file.max_vertices)
+            return shapes.polytope(_said(shape, copies), points, triangles, scene_file.max_vertices)
         case _:
             message = f"geometry {name} is a {type(shape).__name__}, which is not supported"
             raise SceneError("unsupported_shape", message, field="directives", hint="use a primitive or a mesh")
+
+
+def _said(shape: Convex | Mesh, copies: Copies) -> dict[str, Any]:
+    """Returns what the models say of a mesh."""
+    file = copies.original(Path(shape.source().description()))
+    return {"kind": type(shape).__name__.lower(), "file": escaped(file.name), "scale": shape.scale3().tolist()}
 
 
 def _mesh(shape: Convex | Mesh, strict: StrictReader, copies: Copies) -> tuple[Array, NDArray[np.int64]]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from certifier.model import Array
+from certifier.scene.decomposition.solid import closed, fault, welded
 from certifier.scene.hollow import beyond_mesh
 from certifier.scene.hull import outer
 
@@ -31,7 +32,8 @@ class Body:
         shape: the original shape, JSON-able.
         substitution: what replaced the original; None when the body is exact.
         inflation: upper bound in metres on how far the replacement reaches outside the original, or outside the hull of a mesh.
-        beyond: lower estimate in metres of how far the hull of a mesh reaches beyond the mesh.
+        beyond: lower estimate in metres of how far the hull of a mesh, or a part of one, reaches beyond the mesh.
+        fault: why a mesh that its hull reaches beyond bounds no solid, for people; None if it does.
     """
 
     vertices: Array
@@ -40,6 +42,7 @@ class Body:
     substitution: str | None = None
     inflation: float = 0.0
     beyond: float = 0.0
+    fault: str | None = None
 
 
 def box(size: tuple[float, float, float]) -> Body:
@@ -88,7 +91,8 @@ def polytope(shape: dict[str, Any], points: Array, triangles: NDArray[np.int64],
         hull = f"convex hull with {len(vertices)} vertices"
     if shape["kind"] == "convex":
         return Body(vertices, 0.0, shape, f"convex -> {hull}" if inflation else None, inflation)
-    return Body(vertices, 0.0, shape, f"mesh -> {hull}", inflation, beyond_mesh(points, triangles))
+    beyond = beyond_mesh(points, triangles)
+    return Body(vertices, 0.0, shape, f"mesh -> {hull}", inflation, beyond, fault(*closed(*welded(points, triangles))) if beyond else None)
 
 
 def half_space(center: Array, reach: float) -> Body:

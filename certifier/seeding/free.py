@@ -10,7 +10,7 @@ from pydrake.geometry import QueryObject
 from certifier.errors import RegionError
 from certifier.model import Array, Pair, Scene
 from certifier.scene.drake_model import build_diagram, geometry_name
-from certifier.scene.hollow import CONVEX_PARTS, beyond, standing_for
+from certifier.scene.hollow import beyond, remedy, standing_for
 
 SHELLS, EACH = np.geomspace(0.004, 1.0, 12), 40
 """A free configuration is looked for at these parts of the joints' half ranges from the seed, EACH times."""
@@ -114,7 +114,8 @@ def _hollow(scene: Scene, pair: Pair) -> str:
     """Returns that a pair may overlap only in a hull, where one of the two is the hull of something that is not convex."""
     hollow = [(beyond(scene, name), scene.geometry(name)) for name in (pair.a, pair.b) if beyond(scene, name)]
     said = [f"the hull of {g.name} reaches at least {1000 * distance:.3g} mm beyond {standing_for(g)}" for distance, g in hollow]
-    return f"; {' and '.join(said)}, so they may overlap in the hull only ({CONVEX_PARTS})" if said else ""
+    what = " and ".join(dict.fromkeys(remedy(g) for _, g in hollow))
+    return f"; {' and '.join(said)}, so they may overlap in the hull only ({what})" if said else ""
 
 
 def nearest_free(scene: Scene, clearance: Clearance, q: Array, room: float = 0.0, reach: float = 1.0) -> Array | None:

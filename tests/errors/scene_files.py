@@ -63,5 +63,6 @@ SCENE_FILES: Table = {
     ("scene_field", "ignore"): [lambda t: t.load(D + "ignore: 3\n")],
     ("scene_field", "ignore[0]"): [lambda t: t.load(D + "ignore: [[a]]\n")],
     ("scene_field", "hulls"): [lambda t: t.load("hulls: arm/hand\n" + D)],
+    ("scene_field", "decompose"): [lambda t: t.load("decompose: [arm/hand/palm]\n" + D)],
     ("scene_field", "directives[0]"): [lambda t: t.load("directives: [add_model]\n")],
 }

@@ -33,6 +33,7 @@ FAR = (
 )
 BALL_JOINT = """<drake:joint name="b" type="ball"><parent link="hand"/><child link="ball"/></drake:joint><link name="ball"/>"""
 NESTED = '<sdf version="1.9"><model name="room"><model name="shelf"><link name="board"/></model></model></sdf>'
+TETRAHEDRON = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 FAR_MESH = "v 0 0 0\nv 1e7 0 0\nv 0 1e7 0\nv 0 0 1e7\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 ADDED_MESH = "  - add_model: {name: m, file: m.obj}\n  - add_weld: {parent: world, child: m::m}\n"
 MUJOCO = "directives: [{add_model: {name: m, file: m.xml}}]\n"
@@ -147,6 +148,14 @@ SCENES: Table = {
     ],
     ("unknown_name", "hulls[0]"): [lambda t: t.scene(extra="hulls: [elsewhere]\n")],
     ("few_parts", "hulls[0]"): [lambda t: t.scene(extra="hulls: [arm/hand]\n")],
+    ("scene_field", "hulls[0]"): [
+        lambda t: t.scene(extra="hulls: [arm/hand]\ndecompose: {arm/hand/palm: {threshold: 1}}\n", **mesh(TETRAHEDRON))
+    ],
+    ("unknown_name", "decompose.elsewhere"): [lambda t: t.scene(extra="decompose: {elsewhere: {threshold: 1}}\n")],
+    ("decompose", "decompose.arm/hand/palm"): [
+        lambda t: t.scene(extra="decompose: {arm/hand/palm: {threshold: 1}}\n"),
+        lambda t: t.scene(extra="decompose: {arm/hand/palm: {threshold: 1}}\n", **mesh(TETRAHEDRON[: -len("f 2 3 4\n")])),
+    ],
     ("scene_field", "limits.arm/turn"): [lambda t: t.scene(extra="limits: {turn: [-2, 1]}")],
     ("no_joints", "directives"): [lambda t: t.scene(extra="fix: {turn: 0}")],
     ("scene_field", "q_star"): [lambda t: t.scene(extra="q_star: [0, 0]")],

@@ -13,7 +13,7 @@ from tests.rooms import ROOMS
 
 ROOT = Path(__file__).parents[2]
 THIRD_PARTIES = {
-    "certifier": {"cachetools", "cattrs", "flint", "numba", "numpy", "pydrake", "scipy", "xacro", "yaml"},
+    "certifier": {"cachetools", "cattrs", "coacd", "flint", "numba", "numpy", "pydrake", "scipy", "xacro", "yaml"},
     "certifier.verify": {"flint", "numpy"},
     "db": {"alembic", "cryptography", "numpy", "opentelemetry", "pydantic", "pydantic_settings", "sqlalchemy", "structlog"},
     "jobs": {"cachetools", "numpy", "pydantic", "pydantic_core", "sqlalchemy"},
