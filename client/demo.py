@@ -28,7 +28,7 @@ from client.seeds import seed_of
 
 SCENE = Path(__file__).resolve().parent.parent / "examples" / "iiwa_shelf" / "scene.yaml"
 DEADLINES_SECONDS = (120, 1200)
-"""The region of seven joints would go on growing for minutes, so it has two. A busy machine that has no region by then has twenty more."""
+"""The region of seven joints would go on growing for minutes, so it has two. A busy machine without one has twenty more."""
 STOP_SECONDS = 30
 
 

@@ -106,9 +106,8 @@ def run_in_child(
 def prepare(function: str, wait_s: float = 0.0) -> int:
     """Begins to load what the first call of a function needs, waits for it at most this long, and returns the id of the process."""
     module = function.partition(":")[0]
-    if not _idle.get(module):
-        _idle.setdefault(module, []).append(_Nursery(module))
-    nursery = _idle[module][-1]
+    nursery = _free(module)
+    _idle[module].append(nursery)
     nursery.wait(wait_s)
     return nursery.process.pid
 

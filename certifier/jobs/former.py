@@ -57,4 +57,4 @@ class Former:
 
 
 def _named(scene: Scene, pairs: Iterable[int]) -> list[dict[str, str]]:
-    return [vars(scene.pairs[index]) for index in pairs]
+    return [{"a": pair.a, "b": pair.b} for pair in (scene.pairs[index] for index in pairs)]

@@ -25,10 +25,8 @@ from certifier.scene.paddings import PaddedPair, Paddings
 from certifier.scene.paths import beside
 
 KEYS = (
-    *("name", "packages", "directives", "srdf", "q_star", "limits", "fix", "configurations", "padding", "ignore", "hulls", "mesh"),
-    "decompose",
-    "cylinder_sides",
-    "xacro",
+    *("name", "packages", "directives", "srdf", "q_star", "limits", "fix", "configurations", "padding", "ignore", "hulls"),
+    *("decompose", "mesh", "cylinder_sides", "xacro"),
 )
 """The keys of a scene file."""
 SWEPT = "swept"

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from certifier.errors import SceneError, close_matches
-from certifier.model import WORLD, Geometry
+
+if TYPE_CHECKING:  # The command reads scene files without numpy, which the model needs.
+    from certifier.model import Geometry
 
 PART = "part"
 """The kind of shape of a part of a mesh. Its ``of`` is the name of the mesh geometry."""
@@ -25,5 +28,4 @@ def check_known(name: str, known: Sequence[str], where: str) -> None:
     """
     if name not in known:
         message, hint = f"{name!r} is neither a body nor a geometry of the scene", "`ciris scene show` and `scene check` list them"
-        others = [other for other in known if other != WORLD]
-        raise SceneError("unknown_name", message, field=where, hint=close_matches(name, others) or hint)
+        raise SceneError("unknown_name", message, field=where, hint=close_matches(name, list(known)) or hint)

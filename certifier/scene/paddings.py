@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
-from certifier.model import Geometry, Pair
 from certifier.scene.known import check_known, names_of
+
+if TYPE_CHECKING:  # The command reads scene files without numpy, which the model needs.
+    from certifier.model import Geometry, Pair
 
 
 @dataclass(frozen=True)

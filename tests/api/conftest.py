@@ -155,7 +155,7 @@ def running(database: Database, scene: Scene) -> str:
 def busy(database: Database) -> str:
     """The id of a job of which a worker certifies a pair; this process's parent stands for the worker."""
     with database.write() as session:
-        workers.tell(session, Made(leases._name(os.getppid()), WorkerKind.SOLVE, "1.2", 4, 8, 2**34), WorkerState.RUNNING)
+        workers.tell(session, Made(leases.name_of(os.getppid()), WorkerKind.SOLVE, "1.2", 4, 8, 2**34), WorkerState.RUNNING)
         job = a_running_job(session)
         assert claims.claim(session, job.id, lease_seconds=60, batch_seconds=0.5) is not None
         return job.id

@@ -194,7 +194,7 @@ def record(client: TestClient, database: Database) -> dict[str, Any]:
     for route in ("/healthz", "/readyz"):
         ask("GET", route)
     with database.write() as session:  # the solver of the tests is no worker of its own, so its parent stands for one
-        made = Made(leases._name(os.getppid()), WorkerKind.SOLVE, "0.1.0", 2, machine.cores(), machine.memory_bytes())
+        made = Made(leases.name_of(os.getppid()), WorkerKind.SOLVE, "0.1.0", 2, machine.cores(), machine.memory_bytes())
         workers.tell(session, made, WorkerState.RUNNING, "expiry failed: OverflowError")
     path = EXAMPLES / "planar_2dof" / "scene.yaml"
     scene = ask("POST", "/v1/scenes", {"bundle": ("scene.zip", pack_bundle(path), "application/zip")})

@@ -21,7 +21,7 @@ from db.workers import GONE_SECONDS, Made, WorkerKind
 from tests.api.test_metrics import samples
 from tests.db.builders import a_running_job
 
-SOLVE, CONTROL = leases._name(os.getppid()), leases.this_worker()
+SOLVE, CONTROL = leases.name_of(os.getppid()), leases.this_worker()
 """This process's parent stands for a worker, whose process claims; the control worker is this process itself."""
 
 

@@ -18,7 +18,7 @@ from db.workers import Made, WorkerKind
 
 def test_the_page_shows_what_workers_do_and_pauses_them(page: Any, url: str, busy: str, database: Database, barriers: Any) -> None:
     with database.write() as session:
-        made = Made(leases._name(os.getppid()), WorkerKind.SOLVE, "1.2", 4, 8, 2**34)
+        made = Made(leases.name_of(os.getppid()), WorkerKind.SOLVE, "1.2", 4, 8, 2**34)
         workers.tell(session, made, WorkerState.RUNNING, "expiry failed: OverflowError")
     page.goto(url)
     page.get_by_role("link", name="Workers").click()

@@ -18,6 +18,7 @@ TESTED = {
     "certifier/scene/decomposition/child.py:_too_thin": "tests/certifier/scene/decomposition/test_parts.py",
     "certifier/scene/decomposition/child.py:decompose": "tests/certifier/scene/decomposition/test_parts.py",
     "certifier/scene/decomposition/child.py:enlarged": "tests/certifier/scene/decomposition/test_parts.py",
+    "certifier/scene/decomposition/parts.py:parts": "tests/certifier/scene/decomposition/test_scene.py",
     "certifier/scene/drake_model.py:_shape": "tests/certifier/jobs/test_reference.py",
     "certifier/scene/expansion.py:environment": "tests/certifier/scene/test_xacro.py",
     "certifier/scene/expansion.py:expand": "tests/certifier/scene/test_xacro.py",

@@ -15,7 +15,7 @@ from certifier.scene.file import KEYS
 from certifier.seeding.limits import check_limits
 from certifier.verify.scene import check_scene
 from planner.membership import to_s
-from tests.certifier.scene.workshop import EXAMPLES, LIMIT, parsed, write
+from tests.certifier.scene.workshop import EXAMPLES, LIMIT, ROOM, parsed, write
 
 WIDE = LIMIT.replace('"-1"', f'"{-2 * np.pi!r}"').replace('"2"', f'"{2 * np.pi!r}"')
 FINGERS = """<link name="left"><collision><geometry><box size="0.02 0.02 0.1"/></geometry></collision></link>
@@ -164,6 +164,8 @@ def test_what_cannot_be_is_named(tmp_path, change, code, field, words):
 
 
 BOX_AT = '<collision name="{0}"><origin xyz="0 0 {1}"/><geometry><box size="0.02 0.02 0.02"/></geometry></collision>'
+BIN = '<collision name="bin"><geometry><mesh><uri>bin.obj</uri></mesh></geometry></collision>'
+TETRAHEDRON = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 RING = f"""<link name="ring">{BOX_AT.format("low", 0)}{BOX_AT.format("high", 0.1)}</link>
   <joint name="hold" type="fixed"><parent link="hand"/><child link="ring"/></joint>"""
 """A body of two parts."""
@@ -178,7 +180,9 @@ def test_the_documents_example_is_read_and_its_table_has_every_key(tmp_path):
     (tmp_path / "cell").mkdir()
     (tmp_path / "my_robot_description").mkdir()
     (tmp_path / "cell" / "arm.srdf").write_text('<robot name="arm"/>')
-    path = write(tmp_path / "cell", example, limit=WIDE, more=FINGERS + RING)
+    with_bin = ROOM.replace("</link>", f"{BIN}</link>", 1)
+    path = write(tmp_path / "cell", example, limit=WIDE, more=FINGERS + RING, files={"room.sdf": with_bin, "bin.obj": TETRAHEDRON})
     scene = parsed(path)
+    assert [g.name for g in scene.geometries if g.name.startswith("room/walls/bin")] == ["room/walls/bin/part1"]
     assert [j.name for j in scene.moving] == ["arm/turn"]
     assert (scene.q_lower[0], scene.padding, scene.name) == (-1.5, 0.005, "my-cell")

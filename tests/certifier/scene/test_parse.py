@@ -130,7 +130,7 @@ def test_the_hash_is_of_the_content(tmp_path):
 
 def test_remarks(tmp_path):
     drawn = ARM.format(kind="revolute", limit=LIMIT, shape=BOX, more="").replace("collision", "visual", 2)
-    scene = parsed(write(tmp_path, arm=drawn.replace("0.1 0.1 0.1", "30 30 0.1"), extra="q_star: [-1.13]\n"))
+    scene = parsed(write(tmp_path, arm=drawn.replace("0.1 0.1 0.1", "30 30 0.1"), extra="q_star: [-1.11]\n"))
     said = "\n".join(scene.warnings)
     assert "body arm/base has a visual but no collision geometry" in said
     assert "arm/hand/palm is 30 m long" in said
