@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import minimize
 
 from benchmarks import catalogue
+from certifier.model import WORLD, Joint, JointKind, Pair, Scene
 from certifier.outcome import Guarantee
 from certifier.pair.collisions import in_collision
 from certifier.polytopes.ellipsoid import volume, volume_in_q
@@ -16,6 +17,7 @@ from certifier.seeding.contacts import CLOSE, Contacts
 from certifier.seeding.iris import _face, iris
 from certifier.seeding.options import SeedOptions
 from certifier.seeding.trim import trimmed
+from tests.certifier.scenes import ball
 from tests.certifier.seeding.posts import collisions, posts
 
 
@@ -134,3 +136,26 @@ def test_what_may_collide_is_not_called_sampled(monkeypatch):
     account = iris(posts(1), np.zeros((1, 2)), SeedOptions())[2]
     assert account["guarantee"] == Guarantee.NONE
     assert account["warnings"] == ["more than 0.001 of the polytope may collide: too many faces would be needed"]
+
+
+def test_a_contact_beside_the_seed_is_cut_off_although_it_is_next_to_nothing_of_the_polytope():
+    axes = np.eye(3)[:2]
+    bodies = (WORLD, "cart/x", "cart/y")
+    joints = tuple(
+        Joint(f"{bodies[i + 1]}/slide", JointKind.PRISMATIC, bodies[i], bodies[i + 1], axis, np.eye(4), np.eye(4), i, -1.0, 1.0)
+        for i, axis in enumerate(axes)
+    )
+    near = np.array([0.05, 0.0])
+    balls = ball("cart", "cart/y", 0.005), ball("post", WORLD, 0.005, (*near, 0.0))
+    scene = Scene("cart", joints, bodies, balls, (Pair("cart", "post"),), (), np.zeros(2))
+    whole, seed = scene.polytope([], []), np.zeros((1, 2))
+    samples = uniform_in_q(whole, scene, 1000, 20, 0).reshape(-1, 2)
+    assert 0 < in_collision(scene, samples).mean() < 0.0005  # so few that a test of the whole polytope takes no notice
+    found, passed = trimmed(scene, whole, seed, SeedOptions(q=(0.0, 0.0)), np.random.default_rng(0))
+    assert passed
+    assert found.contains(seed).all()
+    ring = near + 0.0099 * np.array([[np.cos(t), np.sin(t)] for t in np.linspace(0, 2 * np.pi, 64)])
+    assert whole.contains(ring).all()
+    assert found.contains(ring).mean() < 0.2
+    assert not found.contains(near[None])[0]
+    assert volume(found, 0)[0] > 1.5
