@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from certifier.errors import SceneError
-from certifier.model import Scene
+from certifier.model import Pair, Scene
 from certifier.scene.bundle import load_bundle, pack_bundle
 from certifier.scene.contacts import touching
 from certifier.scene.decomposition import parts as asking
@@ -67,6 +67,19 @@ def test_what_ignores_the_mesh_ignores_its_parts(tmp_path: Path, pair: str) -> N
     assert not any(name in PARTS for pair in pairs_of(scene) for name in pair)
     assert {ignored.b for ignored in scene.ignored} >= {*PARTS}
     assert {ignored.reason for ignored in scene.ignored} == {"known"}
+
+
+@pytest.mark.parametrize(
+    ("padding", "found"),
+    [
+        ("{bodies: {room/walls/corner: 0.002}}", (0.002, 0.002)),
+        ("{bodies: {room/walls: 0.004, room/walls/corner: 0.002, room/walls/corner/part1: 0.003}}", (0.003, 0.002)),
+        ("{pairs: [{pair: [room/walls/corner, arm/hand], padding: 0.001}]}", (0.001, 0.001)),
+    ],
+)
+def test_what_pads_the_mesh_pads_its_parts(tmp_path: Path, padding: str, found: tuple[float, float]) -> None:
+    scene = parsed(corner(tmp_path, DECOMPOSED + f"padding: {padding}\n"))
+    assert tuple(scene.padding_of(Pair("arm/hand/palm", part)) for part in PARTS) == found
 
 
 def test_one_part_can_be_ignored(tmp_path: Path) -> None:
