@@ -15,7 +15,7 @@ if TYPE_CHECKING:  # The command packs scene files without numpy, which the mode
 
 TIMEOUT_S, MEMORY_BYTES = 60.0, 4 * 2**30
 DECOMPOSE_S = 120.0
-"""Decomposing a mesh may take so long besides."""
+"""Decomposing one mesh may take this many seconds."""
 
 
 def load_scene(path: str | Path, *, timeout_s: float = TIMEOUT_S, memory_bytes: int = MEMORY_BYTES) -> Scene:

@@ -155,10 +155,10 @@ def _needed(clouds: Sequence[Array], parts: Sequence[Part]) -> list[Array]:
 
 
 def _grown(points: Array, by: float) -> Array:
-    """Returns as many points as the hull of a cloud has vertices, whose hull reaches farther to every side by so much at least, in metres.
+    """Returns the vertices of a cloud's hull, (h, 3), moved outwards.
 
-    A vertex moves to where it is so far beyond the planes of all facets that it is on. These are Lawson and Hanson's problems of least
-    distance.
+    Each moves the least distance that takes it ``by`` metres beyond the plane of every facet that it belongs to. Nonnegative least squares
+    find this distance (Lawson and Hanson). A vertex of a thin wedge moves less (_LONGEST).
     """
     try:
         hull = ConvexHull(points)

@@ -1,4 +1,4 @@
-"""What is told while a proposal is made, and what remains of it when there is no time left."""
+"""Progress of a proposal, and the reason that a job gives when the deadline ends the proposal."""
 
 from __future__ import annotations
 

@@ -131,14 +131,18 @@ def test_pairs_of_which_one_touches_are_not_certified_as_one():
     assert outcomes == [Outcome.INCONCLUSIVE]
 
 
-def test_a_region_has_a_proof_of_every_pair_and_is_free():
-    scene = beads()
-    region = grow(scene, GrowthOptions(seed=box_seed([0.0, 0.0], 0.6), cells=600))
+def proved(scene, region):
+    """Checks that the verifier accepts a proof of every pair, and returns how many proofs there are."""
     statement = verify_region(region.proof)
     assert set(statement.gaps) == set(scene.pairs)
     assert min(statement.gaps.values()) > 0
-    digests = [pair["proof_digest"] for pair in region.manifest["pairs"]]
-    assert len(set(digests)) < len(digests)
+    return len({pair["proof_digest"] for pair in region.manifest["pairs"]})
+
+
+def test_a_region_has_a_proof_of_every_pair_and_is_free():
+    scene = beads()
+    region = grow(scene, GrowthOptions(seed=box_seed([0.0, 0.0], 0.6), cells=600))
+    assert proved(scene, region) < len(scene.pairs)
     C, d = (np.array(region.manifest[name]) for name in ("halfspace_normals", "halfspace_offsets"))
     s = np.random.default_rng(1).uniform(-1, 1, size=(20000, 2))
     inside = s[(s @ C.T <= d).all(axis=1)]
@@ -153,9 +157,7 @@ def test_a_region_has_a_proof_of_every_pair_and_is_free():
 def test_a_region_of_such_pairs_is_certified_again_for_a_changed_scene():
     region = grow(beads(), GrowthOptions(seed=box_seed([0.0, 0.0], 0.5), cells=600))
     changed = beads(obstacle=box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.7, 1.4, 0.0)))
-    statement = verify_region(recertify(changed, region.proof).proof)
-    assert set(statement.gaps) == set(changed.pairs)
-    assert min(statement.gaps.values()) > 0
+    proved(changed, recertify(changed, region.proof))
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -181,10 +183,7 @@ def test_a_hand_of_several_bodies_shares_one_certificate_and_one_box_contains_it
 def test_a_region_of_an_arm_with_a_hand_is_proved_of_each_of_its_bodies():
     scene = hand()
     region = grow(scene, GrowthOptions(seed=box_seed([0.0, 0.0], 0.3), cells=600))
-    statement = verify_region(region.proof)
-    assert set(statement.gaps) == set(scene.pairs)
-    assert min(statement.gaps.values()) > 0
-    assert len({pair["proof_digest"] for pair in region.manifest["pairs"]}) == 1
+    assert proved(scene, region) == 1
 
 
 def test_a_volume_that_is_much_nearer_than_its_geometries_at_a_configuration_to_keep_is_divided():
