@@ -28,4 +28,4 @@ def check_known(name: str, known: Sequence[str], where: str) -> None:
     """
     if name not in known:
         message, hint = f"{name!r} is neither a body nor a geometry of the scene", "`ciris scene show` and `scene check` list them"
-        raise SceneError("unknown_name", message, field=where, hint=close_matches(name, list(known)) or hint)
+        raise SceneError("unknown_name", message, field=where, hint=close_matches(name, list(dict.fromkeys(known))) or hint)

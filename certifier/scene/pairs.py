@@ -31,7 +31,7 @@ def pairs(
     """
     body = {g.name: g.body for g in geometries}
     named = {g.name: names_of(g) for g in geometries}
-    known = list(dict.fromkeys([*tree.bodies, *(name for names in named.values() for name in names)]))
+    known = [*tree.bodies, *(name for names in named.values() for name in names)]
     for entry in ignore:
         for k, name in enumerate((entry.a, entry.b)):
             check_known(name, known, f"{entry.field}[{k}]")

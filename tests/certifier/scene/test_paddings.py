@@ -74,6 +74,12 @@ def test_unknown_names_are_refused(tmp_path, said, field):
     assert (refusal.value.code, refusal.value.field) == ("unknown_name", field)
 
 
+def test_a_name_is_suggested_once(tmp_path):
+    with pytest.raises(SceneError) as refusal:
+        parsed(write(tmp_path, extra="padding: {bodies: {arm/hnd: 0.01}}\n"))
+    assert str(refusal.value.hint).count("arm/hand") == 1 + str(refusal.value.hint).count("arm/hand/")
+
+
 @pytest.mark.parametrize("said", ["0.4", "{bodies: {arm/tip: 0.4}}", "{pairs: [{pair: [arm/tip, room/walls], padding: 0.4}]}"])
 def test_a_half_space_reaches_as_far_as_the_largest_padding(tmp_path, said):
     path = write(tmp_path, more=MORE, extra=f"padding: {said}\n")
