@@ -50,6 +50,7 @@ class Certify:
         parts: pair index -> how many parts its open cells are divided among; 1 for a pair that is left out.
         ending: pairs whose open cells are going to be cut off where the volumes touch that are tried next in these cells; all open cells
             where the pair is hard as well.
+        keep: (k, n) points that stay inside, where faces will be added to the polytope; None where it stays as it is.
         together: pair index -> the other pairs that share its certificate, and are not among ``pairs`` or in ``reuse``.
     """
 
@@ -67,6 +68,7 @@ class Certify:
     begun: int | None = None
     parts: dict[int, int] = field(default_factory=dict)
     ending: list[int] = field(default_factory=list)
+    keep: Array | None = None
     together: dict[int, tuple[int, ...]] = field(default_factory=dict)
 
     @property

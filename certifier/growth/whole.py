@@ -256,6 +256,7 @@ def _next(scene: Scene, state: GrowthState) -> Transition:
         begun=whole.begun,
         parts=_parts(pairs, whole),
         ending=[i for i in pairs if spent[i] >= effort[i]],
+        keep=None if state.start is None else state.start.keep,
         together=whole.together,
     )
     return Transition(replace(state, next=state.next + 1), action)

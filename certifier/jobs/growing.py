@@ -117,6 +117,7 @@ def make_region(
     former: Former | None,
     processes: int = 1,
     progress: Progress | None = None,
+    last: Region | None = None,
 ) -> Region:
     """Makes a region of a certified polytope, which verifies its proof.
 
@@ -125,7 +126,7 @@ def make_region(
         proofs: pair index -> proof file, for the pairs that ``candidate.proofs`` names, in its order.
         proposal: what the region is grown from; None for a given polytope.
         former: the region that is certified again; None where one is grown.
-        processes, progress: as for :func:`certifier.jobs.region.certified_region`.
+        processes, progress, last: as for :func:`certifier.jobs.region.certified_region`.
 
     Raises:
         ProofError: the proof does not hold. Nothing may be served as certified then.
@@ -147,4 +148,4 @@ def make_region(
     if former is not None and proposal is not None:
         cuts = {} if state.whole is None else state.whole.cuts
         provenance["recertified"] = former.document(scene, cuts, proposal, candidate.polytope)
-    return certified_region(scene, candidate, proofs, provenance, proposal, processes, progress)
+    return certified_region(scene, candidate, proofs, provenance, proposal, processes, progress, last)

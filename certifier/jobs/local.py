@@ -67,6 +67,7 @@ class _Memory:
         certified: the polytopes that were certified, in order.
         candidate: the last certified polytope; None before there is one.
         made: the candidate that a region was made of last; None before there is one.
+        last: this region.
         rests_until: no region but the last one is made before this many seconds of the job.
         proposal: what the region is grown from; None before there is a candidate.
         told: what the child process that makes the proposal has told last.
@@ -89,6 +90,7 @@ class _Memory:
     certified: list[Certified] = field(default_factory=list)
     candidate: Candidate | None = None
     made: Candidate | None = None
+    last: Region | None = None
     rests_until: float = 0.0
     proposal: SampledProposal | None = None
     told: dict[str, Any] = field(default_factory=dict)
@@ -152,12 +154,12 @@ class _Memory:
         account = Account(self.certified, self.seeding_seconds, spent, self.seconds)
         self.tell("step", {"kind": "accept", "state": "running", "seconds": None})
         proofs = self.proofs(self.candidate)
-        made = (self.scene, self.state, self.candidate, proofs, account, self.proposal, self.former, self.processes, self._tell_verified)
-        region = make_region(*made)
+        made_of = (self.scene, self.state, self.candidate, proofs, account, self.proposal, self.former)
+        region = make_region(*made_of, self.processes, self._tell_verified, self.last)
         taken = self.seconds - begun
         self.tell("step", {"kind": "accept", "state": "done", "seconds": taken})
         self.tell("region", {"iteration": self.candidate.iteration, "ellipsoid_volume": self.candidate.ellipsoid_volume, **region.summary})
-        self.made, self.rests_until = self.candidate, self.seconds + REST * taken
+        self.made, self.last, self.rests_until = self.candidate, region, self.seconds + REST * taken
         return region
 
     def _tell_note(self, text: str, part: float | None = None) -> None:

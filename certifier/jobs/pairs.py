@@ -38,7 +38,7 @@ def part_certifier(scene: Scene, action: Certify, seed: int, left: Left, carried
     if action.cells == 1:
         program = Certification(scene, action.polytope, action.center, seed)
         return lambda index, part: program.certify(index, every_face=index in action.hard)
-    search, begun = CellCertification(scene, action.polytope, seed, action.box, action.together, action.label == "cells"), action.begun
+    search, begun = CellCertification(scene, action.polytope, seed, action.box, action.together, action.keep), action.begun
     if begun is None:
         return _beginning(search, action, cut_off, carried or Carry({}, {}))
 

@@ -86,7 +86,8 @@ class CellCertification:
         box: the root cell, proved around a polytope of which P is a part (:meth:`ProvedBox.on`); None for P's smallest box. What was begun
             must have had the same one.
         together: pairs that share one certificate with others; None for none. What was begun must have had the same ones.
-        faces: faces will be added to the polytope where pairs are hard, and so their cells are cut in other ways.
+        keep: (k, n) points that stay inside, where faces will be added to the polytope: there, cells of hard pairs are cut in other ways.
+            None where the polytope stays as it is.
         finer: as :class:`certifier.partition.area.Area` has it.
 
     Raises:
@@ -100,10 +101,10 @@ class CellCertification:
         seed: int = 0,
         box: ProvedBox | None = None,
         together: Together | None = None,
-        faces: bool = False,
+        keep: Array | None = None,
         finer: float = 1.0,
     ) -> None:
-        self._scene, self._together, self._faces = scene, together or {}, faces
+        self._scene, self._together, self._keep = scene, together or {}, keep
         self._area = Area.of(scene, polytope, seed, box, finer)
         check_ground(scene, self._area.ground)
         check_interior(scene, self._area.ground, self._area.center)
@@ -137,7 +138,7 @@ class CellCertification:
             parts: how many parts the round has.
         """
         start, volumes = time.perf_counter(), self._volumes(index)
-        search = Search(self._area, self._shared, volumes, self._faces)
+        search = Search(self._area, self._shared, volumes, self._keep)
         given, contacts = dealt(open_cells(left), part, parts), search.scout(1 + part)
         report = search.run(given, cells)
         result = self._left(search, volumes, given, replace(report, contacts=contacts + report.contacts), cut_off)
@@ -155,7 +156,7 @@ class CellCertification:
         # One process often verifies several parts of a pair, one after the other.
         if self._last is None or self._last[:2] != (index, rounds):
             volumes = self._volumes(index)
-            search = Search(self._area, self._shared, volumes, self._faces)
+            search = Search(self._area, self._shared, volumes, self._keep)
             vertices = [len(a.vertices) + len(b.vertices) for a, b in choices_of(volumes, search.coarse)]
             root = put_together(rounds, len(self._area.ground.d), 2 * self._scene.n, vertices)
             self._last = index, rounds, self._proof(search, volumes, root)
@@ -166,7 +167,7 @@ class CellCertification:
         return volumes_of(self._scene, [self._scene.pairs[i] for i in (index, *self._together.get(index, ()))])
 
     def _attempt(self, volumes: Volumes) -> PairResult | None:
-        search, root = Search(self._area, self._shared, volumes, self._faces), Node()
+        search, root = Search(self._area, self._shared, volumes, self._keep), Node()
         search.run([OpenCell(root, self._area.lower, self._area.upper)], GROUP_CELLS)
         if any(node.kind == OPEN for node in root.preorder()):
             return None
@@ -174,13 +175,13 @@ class CellCertification:
         return result if result.outcome is Outcome.CERTIFIED else None
 
     def _begin(self, volumes: Volumes, cells: int, cut_off: CutOff, former: PartitionProof | None) -> PairResult:
-        area, search = self._area, Search(self._area, self._shared, volumes, self._faces)
+        area, search = self._area, Search(self._area, self._shared, volumes, self._keep)
         contacts = search.scout(0)
         root = Node() if former is None else try_again(area, search, volumes, former)
         given = [OpenCell(root, area.lower, area.upper)]
         report = Report(contacts=contacts) if contacts else search.run(root.open_cells(area.lower, area.upper), cells)
         if any(node.kind == OPEN for node in root.preorder()):
-            if not (self._faces or report.contacts):  # where faces are added, every round looks again
+            if self._keep is None and not report.contacts:  # where faces are added, every round looks again
                 looks = (search.scout(seed) for seed in range(1, 1 + LOOKS_AGAIN))
                 report = replace(report, contacts=next(filter(None, looks), []))
             return self._left(search, volumes, given, report, cut_off)

@@ -46,7 +46,7 @@ def parted(scene: Scene, polytope: Polytope, samples: Array, keep: Array) -> lis
     for index in long:
         if index not in others:
             volumes = volumes_of(scene, [scene.pairs[i] for i in (index, *joined.get(index, ()))])
-            search = Search(area, shared, volumes, faces=True)
+            search = Search(area, shared, volumes, keep)
             found.append(search.parted or search.bodies)
     return found
 

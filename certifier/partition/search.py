@@ -52,6 +52,9 @@ SAVED, MOST_PARTED, NARROW_PARTED = 2, 6, np.radians(3.5)
 """Where faces are added, and MANY_JOINTS or more move one body against the other, they separate the slimmest level that at most MOST_PARTED
 joints move. Of bodies that are no two chains, it has to save SAVED joints, and to have a coarse volume in the place of one of them only.
 Cells are cut for it until they turn less than NARROW_PARTED."""
+ROOM = 0.25
+"""At every point that stays inside, the volumes that faces separate are farther apart than this part of the larger radius. Faces between
+nearer ones would have to pass close by the point, and cost most of the polytope."""
 LOOKED_AT = 64
 """Of two chains, a cell in which the volumes of a level touch is tried with the next level at once, except for volumes that faces separate.
 Cuts for volumes that touch would only multiply the cells of the next level, which has to be cut in other joints. Of the configurations of a
@@ -87,7 +90,7 @@ class Search:
     """Searches the partition of two volumes on one polytope.
 
     Args:
-        faces: faces will be added to the polytope where the pair is hard.
+        keep: (k, n) points that stay inside, where faces will be added to the polytope; None where it stays as it is.
 
     Attributes:
         frame: body in whose frame the planes are.
@@ -98,7 +101,7 @@ class Search:
         volumes_of_levels: the two volumes of every level; those of level 0 are the volumes themselves.
     """
 
-    def __init__(self, area: Area, shared: Shared, volumes: tuple[Volume, Volume], faces: bool = False) -> None:
+    def __init__(self, area: Area, shared: Shared, volumes: tuple[Volume, Volume], keep: Array | None = None) -> None:
         self._area, self._shared = area, shared
         self.frame, self.joints = choose_frame(area.kinematics, volumes, area.lower, area.upper)
         self.coarse, levels, self._fat, self._two_chains = levels_of(area, self.frame, volumes)
@@ -107,7 +110,7 @@ class Search:
         self.bodies = Bodies(area, self.frame, volumes)
         self.volumes_of_levels = [chosen[choice] for choice in self._choices]
         self._levels = [self.bodies, *(shared.bodies(self.frame, chosen[choice]) for choice in self._choices[1:])]
-        self.parted = self._parted(levels) if faces and len(self.joints) >= MANY_JOINTS else None
+        self.parted = None if keep is None or len(self.joints) < MANY_JOINTS else self._parted(levels, keep)
 
     def run(self, cells: Sequence[OpenCell], most: int) -> Report:
         """Works on open cells, whose nodes it changes.
@@ -168,12 +171,17 @@ class Search:
                 contacts.append(s)
         return contacts
 
-    def _parted(self, levels: list[Level]) -> Bodies | None:
+    def _parted(self, levels: list[Level], keep: Array) -> Bodies | None:
         if self._two_chains:
-            return next((bodies for bodies in self._levels[1:] if len(bodies.joints) <= MOST_PARTED), None)
-        most = min(MOST_PARTED, len(self.joints) - SAVED)
-        one_sided = (bodies for bodies, level in zip(self._levels, levels, strict=True) if (level[0] > 0) != (level[1] > 0))
-        return next((bodies for bodies in one_sided if len(bodies.joints) <= most), None)
+            found = next((bodies for bodies in self._levels[1:] if len(bodies.joints) <= MOST_PARTED), None)
+        else:
+            most = min(MOST_PARTED, len(self.joints) - SAVED)
+            one_sided = (bodies for bodies, level in zip(self._levels, levels, strict=True) if (level[0] > 0) != (level[1] > 0))
+            found = next((bodies for bodies in one_sided if len(bodies.joints) <= most), None)
+        if found is None:
+            return None
+        room = ROOM * max(volume.radius for volume in found.volumes)
+        return found if (found.extent * gaps(*found.hulls, keep) > room).all() else None
 
     def _halves(self, cell: Cell, joint: int, value: float, points: Array) -> list[Cell]:
         """Returns the lower and the upper part of a cell, with nodes of their own."""

@@ -11,13 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from certifier.model import Array, Geometry, Pair, Polytope, Scene, Volume
-from certifier.partition.hulls import gaps
 from certifier.partition.parted import long_pairs, parted
 from certifier.seeding.rating import samples_of
 
-ROOM = 0.25
-"""At every point that stays inside, two volumes are farther apart than this part of the larger radius. Faces that keep nearer ones apart
-would have to pass close by the point, and cost most of the polytope."""
 NO_LENGTH = 1e-9
 """A capsule that is shorter than this, in metres, is a ball to Drake, which knows no capsule without length."""
 
@@ -42,8 +38,6 @@ CoarsePairs = dict[tuple[Shape, Shape], tuple[Volume, Volume]]
 def coarse_pairs_of(scene: Scene, polytope: Polytope, points: Array) -> CoarsePairs:
     """Returns the volumes that faces keep apart on a polytope, where they are not geometries of the scene.
 
-    Left out are those without ROOM. There the geometries themselves have to do.
-
     Args:
         polytope: joint limits included.
         points: (k, n) points in s that stay inside.
@@ -57,12 +51,10 @@ def coarse_pairs_of(scene: Scene, polytope: Polytope, points: Array) -> CoarsePa
     for bodies in parted(scene, polytope, samples_of(scene, polytope), points):
         if all(volume.is_geometry_of(scene) for volume in bodies.volumes):
             continue
-        room = ROOM * max(volume.radius for volume in bodies.volumes)
-        if (bodies.extent * gaps(*bodies.hulls, points) > room).all():
-            first, second = (Shape(volume.body, volume.vertices.tobytes(), volume.radius) for volume in bodies.volumes)
-            known = found.get((first, second))
-            if known is None or scene.padding_between(known) < scene.padding_between(bodies.volumes):
-                found[first, second] = bodies.volumes
+        first, second = (Shape(volume.body, volume.vertices.tobytes(), volume.radius) for volume in bodies.volumes)
+        known = found.get((first, second))
+        if known is None or scene.padding_between(known) < scene.padding_between(bodies.volumes):
+            found[first, second] = bodies.volumes
     return found
 
 

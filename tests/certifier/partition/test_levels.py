@@ -20,6 +20,7 @@ from certifier.partition.bodies import Bodies, Undecided
 from certifier.partition.cell import Cell
 from certifier.partition.certification import CellCertification, CutOff
 from certifier.partition.frames import choose_frame
+from certifier.partition.hulls import gaps
 from certifier.partition.levels import APART, LOOKED, levels_of
 from certifier.partition.search import Search
 from certifier.partition.shared import Shared
@@ -199,7 +200,7 @@ def test_points_are_named_where_a_ball_touches_that_saves_joints_so_that_faces_p
     scene, polytope, index = reaching()
     without = CellCertification(scene, polytope).certify(index, CELLS // 2).weakness
     assert (len(without.points), without.joints) == (without.contacts, ())
-    certification = CellCertification(scene, polytope, faces=True)
+    certification = CellCertification(scene, polytope, keep=np.zeros((1, scene.n)))
     found = certification.certify(index, CELLS // 2)
     area, _, alternatives = levels(scene, polytope, index)
     weakness, (a, b) = found.weakness, alternatives[1]
@@ -218,7 +219,13 @@ def test_points_are_named_where_a_ball_touches_that_saves_joints_so_that_faces_p
 
 def parted(scene, polytope, index, faces=True):
     certification = CellCertification(scene, polytope)
-    return Search(certification._area, certification._shared, certification._volumes(index), faces).parted
+    return Search(
+        certification._area, certification._shared, certification._volumes(index), keep_of(certification) if faces else None
+    ).parted
+
+
+def keep_of(certification):
+    return certification._area.center[None]
 
 
 def test_faces_part_coarse_volumes_only_where_they_are_added_and_save_two_joints_of_seven():
@@ -230,12 +237,32 @@ def test_faces_part_coarse_volumes_only_where_they_are_added_and_save_two_joints
     assert parted(two, cube_of_two, HANDS) is None, "both bodies would be coarse"
 
 
+def test_faces_part_no_volumes_that_lack_room_at_a_point_to_keep():
+    """Faces keep the ball about the hand from the obstacle where it has room at all points to keep, and else the links themselves."""
+    scene, polytope, index = reaching()
+    certification = CellCertification(scene, polytope)
+    given = certification._area, certification._shared, certification._volumes(index)
+    ball = Search(*given, np.zeros((1, scene.n))).parted
+    radius = max(volume.radius for volume in ball.volumes)
+    samples = certification._area.samples
+    apart = ball.extent * gaps(*ball.hulls, samples)
+    nearest = np.argsort(apart)[[0, 1, 2, 3, -3, -2, -1]]
+    assert apart[nearest[0]] < search.ROOM * radius < apart[nearest[-1]]
+    for s, distance in zip(samples[nearest], apart[nearest], strict=True):
+        found = Search(*given, s[None]).parted
+        assert (found is not None) == (distance > search.ROOM * radius)
+        assert Search(*given, np.stack([np.zeros(scene.n), s])).parted is None or found is not None
+
+
 def test_wide_cells_are_cut_for_the_volumes_that_faces_part_and_not_for_the_bodies():
     scene, polytope, index = reaching()
     certification = CellCertification(scene, polytope)
     cuts = {}
     for faces in (False, True):
-        looking, root = Search(certification._area, certification._shared, certification._volumes(index), faces), Node()
+        looking, root = (
+            Search(certification._area, certification._shared, certification._volumes(index), keep_of(certification) if faces else None),
+            Node(),
+        )
         looking.run([OpenCell(root, certification._area.lower, certification._area.upper)], CELLS)
         cuts[faces] = {node.kind for node in root.preorder() if node.children}
     assert cuts[True] <= {0, 1, 2, 3}
@@ -267,7 +294,7 @@ def test_cells_of_two_chains_are_not_cut_for_volumes_that_touch(monkeypatch, fac
     results = []
     for touch in (search._touch, lambda bodies, found: False):
         monkeypatch.setattr(search, "_touch", touch)
-        results.append(CellCertification(scene, polytope, faces=faces).certify(index, 10 * CELLS))
+        results.append(CellCertification(scene, polytope, keep=np.zeros((1, scene.n)) if faces else None).certify(index, 10 * CELLS))
     assert [result.outcome for result in results] == [Outcome.CERTIFIED, Outcome.INCONCLUSIVE]
     proof = PartitionProof.from_bytes(results[0].proof, scene)
     samples = Area.of(scene, polytope, 3).samples

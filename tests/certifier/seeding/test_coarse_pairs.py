@@ -9,10 +9,11 @@ import pytest
 from benchmarks import catalogue
 from certifier.model import Volume
 from certifier.pair.collisions import in_collision
+from certifier.partition import search
 from certifier.partition.hulls import gaps
 from certifier.partition.parted import parted
 from certifier.polytopes.gibbs import uniform_in_q
-from certifier.seeding import coarse_pairs, iris, trim
+from certifier.seeding import iris, trim
 from certifier.seeding.coarse_pairs import Shape, coarse_pairs_of, with_coarse_pairs
 from certifier.seeding.drake_iris import checker
 from certifier.seeding.options import SeedOptions
@@ -50,12 +51,13 @@ def test_drake_sees_the_volumes_that_faces_part(hand):
 
 def test_a_volume_without_room_at_a_point_that_stays_inside_is_left_out(hand, monkeypatch):
     scene, polytope, seed, samples = hand
+    monkeypatch.setattr(search, "ROOM", -1e9)
     bodies = [one for one in parted(scene, polytope, samples, seed) if not all(v.is_geometry_of(scene) for v in one.volumes)]
     room = [one.extent * gaps(*one.hulls, seed)[0] / max(v.radius for v in one.volumes) for one in bodies]
     assert 0 < min(room) < max(room)
     ways = sorted(room)
     for limit in (0.0, *((a + b) / 2 for a, b in itertools.pairwise(ways) if b - a > 1e-3), 1 + ways[-1]):
-        monkeypatch.setattr(coarse_pairs, "ROOM", limit)
+        monkeypatch.setattr(search, "ROOM", limit)
         kept = {volumes[1].geometries for volumes in coarse_pairs_of(scene, polytope, seed).values()}
         assert kept == {one.volumes[1].geometries for one, has in zip(bodies, room, strict=True) if has > limit}
 
