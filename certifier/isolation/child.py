@@ -119,6 +119,7 @@ def _free(module: str) -> _Nursery:
         nursery = waiting.pop()
         if nursery.process.poll() is None:
             return nursery
+        nursery.kill()
     return _Nursery(module)
 
 
@@ -142,6 +143,7 @@ class _Nursery:
         self._loaded = False
         self._connection, theirs = Pipe()
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the process
+        self._last_words = ""
         root = str(Path(__file__).resolve().parents[2])
         path = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
         with theirs:
@@ -215,9 +217,13 @@ class _Nursery:
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait()
         self._connection.close()
+        self._last_words = self.tail()
+        self._log.close()
 
     def tail(self) -> str:
         """Returns the last lines of the log as one line after a colon, without the frames of a traceback; empty for an empty log."""
+        if self._log.closed:
+            return self._last_words
         self._log.seek(max(0, self._log.seek(0, os.SEEK_END) - _TAIL_BYTES))
         lines = self._log.read().decode(errors="replace").splitlines()
         text = " ".join(line.strip() for line in lines if line.strip() and not line.startswith((" ", "Traceback")))
