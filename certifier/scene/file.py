@@ -7,7 +7,6 @@ numbers. Only their relative ``file`` paths are made absolute, because in a stri
 from __future__ import annotations
 
 import json
-import math
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,11 +15,11 @@ from typing import Any
 import yaml
 
 from certifier.configurations import Q_STAR, is_configuration_name
-from certifier.errors import SceneError, close_matches
-from certifier.names import ALPHABET, MAX_SENTENCE, is_name, is_sentence
-from certifier.positions import MAGNITUDE
+from certifier.errors import SceneError
+from certifier.names import ALPHABET
+from certifier.scene import fields
 from certifier.scene.directives import added_files, check_directives, replaced, resolved
-from certifier.scene.nodes import MEND, compose, decoded
+from certifier.scene.nodes import compose, decoded
 from certifier.scene.paddings import PaddedPair, Paddings
 from certifier.scene.paths import beside
 
@@ -117,18 +116,18 @@ def read_scene_file(path: Path) -> SceneFile:
     root = compose(text, path.name)
     nodes = _mapping(root, path.name)
     if "directives" not in nodes:
-        raise _wrong("directives", "is missing", hint="a list of Drake Model Directives that adds the robot and its surroundings")
-    values: dict[str, Any] = {key: _construct(node, key) for key, node in nodes.items() if key != "directives"}
-    mesh = _section(values.get("mesh", {}), "mesh", ("mode", "max_vertices"))
+        raise fields.wrong("directives", "is missing", hint="a list of Drake Model Directives that adds the robot and its surroundings")
+    values: dict[str, Any] = {key: fields.construct(node, key) for key, node in nodes.items() if key != "directives"}
+    mesh = fields.section(values.get("mesh", {}), "mesh", ("mode", "max_vertices"))
     if mesh.get("mode", "hull") != "hull":
-        raise _wrong("mesh.mode", f"must be hull, not {mesh['mode']!r}")
+        raise fields.wrong("mesh.mode", f"must be hull, not {mesh['mode']!r}")
     fix = _by_joint(values.get("fix", {}), "fix")
     padding, paddings = _padding(values.get("padding", 0.0))
     directives = nodes["directives"]
     _check_directives(directives, path.name)
     return SceneFile(
         path=path,
-        name=_name(values.get("name", path.parent.name if path.stem == "scene" else path.stem), "name"),
+        name=fields.name(values.get("name", path.parent.name if path.stem == "scene" else path.stem), "name"),
         packages=_packages(values.get("packages", {}), path.parent),
         directives=text[directives.start_mark.index : directives.end_mark.index].rstrip(),
         resolved_directives=resolved(text, directives, path.parent),
@@ -142,8 +141,8 @@ def read_scene_file(path: Path) -> SceneFile:
         ignore=_ignore(values.get("ignore", [])),
         hulls=_hulls(values.get("hulls", [])),
         decompose=_decompose(values.get("decompose", {})),
-        max_vertices=_integer(mesh.get("max_vertices", 32), "mesh.max_vertices", minimum=MIN_HULL_VERTICES, maximum=MAX_VERTICES),
-        cylinder_sides=_integer(values.get("cylinder_sides", 12), "cylinder_sides", minimum=3, maximum=MAX_SIDES),
+        max_vertices=fields.integer(mesh.get("max_vertices", 32), "mesh.max_vertices", minimum=MIN_HULL_VERTICES, maximum=MAX_VERTICES),
+        cylinder_sides=fields.integer(values.get("cylinder_sides", 12), "cylinder_sides", minimum=3, maximum=MAX_SIDES),
         srdf=_srdf(values.get("srdf", {})),
         configurations=_configurations(values.get("configurations", {})),
         xacro=_arguments(values.get("xacro", {})),
@@ -174,143 +173,61 @@ def _text(path: Path) -> str:
     return decoded(data, path.name)
 
 
-def _construct(node: yaml.Node, where: str) -> Any:
-    _check_unique(node, where)
-    try:
-        return yaml.constructor.SafeConstructor().construct_document(node)
-    except (yaml.YAMLError, ValueError) as error:
-        problem = error.problem if isinstance(error, yaml.MarkedYAMLError) else str(error)
-        raise _wrong(where, f"line {node.start_mark.line + 1}: {problem}", hint=MEND) from None
-
-
-def _check_unique(node: yaml.Node, where: str) -> None:
-    """Refuses a key that a mapping has twice: YAML's reader would take the last one without a word."""
-    if isinstance(node, yaml.MappingNode):
-        seen = set()
-        for key, value in node.value:
-            if not isinstance(key, yaml.ScalarNode):
-                raise _wrong(where, f"line {key.start_mark.line + 1}: a key must be text")
-            place = f"{where}.{key.value}"
-            if key.value in seen:
-                raise _twice(place, key)
-            seen.add(key.value)
-            _check_unique(value, place)
-    elif isinstance(node, yaml.SequenceNode):
-        for i, value in enumerate(node.value):
-            _check_unique(value, f"{where}[{i}]")
-
-
-def _twice(where: str, key: yaml.Node) -> SceneError:
-    return _wrong(where, f"is given twice, again in line {key.start_mark.line + 1}", hint="leave one of them out")
-
-
-def _wrong(where: str, message: str, hint: str = "") -> SceneError:
-    return SceneError("scene_field", message, field=where or None, hint=hint)
-
-
 def _mapping(node: yaml.Node | None, name: str) -> dict[str, yaml.Node]:
     if not isinstance(node, yaml.MappingNode):
-        raise _wrong("", f"{name} must be a mapping of name, directives and so on")
+        raise fields.wrong("", f"{name} must be a mapping of name, directives and so on")
     found: dict[str, yaml.Node] = {}
     for key, value in node.value:
         if not isinstance(key, yaml.ScalarNode):
-            raise _wrong("", f"{name}, line {key.start_mark.line + 1}: a key must be text")
+            raise fields.wrong("", f"{name}, line {key.start_mark.line + 1}: a key must be text")
         if key.value in found:
-            raise _twice(str(key.value), key)
+            raise fields.twice(str(key.value), key)
         found[key.value] = value
-    _known(found, "", KEYS)
+    fields.check_known(found, "", KEYS)
     return found
-
-
-def _known(found: dict[str, Any], where: str, known: tuple[str, ...]) -> None:
-    for key in found:
-        if key not in known:
-            hint = close_matches(str(key), list(known)) or f"known keys: {', '.join(known)}"
-            raise _wrong(f"{where}.{key}" if where else str(key), "is not a key of a scene file", hint=hint)
-
-
-def _section(value: Any, where: str, known: tuple[str, ...]) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise _wrong(where, f"must be a mapping with the keys {', '.join(known)}")
-    _known(value, where, known)
-    return value
-
-
-def _string(value: Any, where: str) -> str:
-    if not isinstance(value, str) or not value or not value.isprintable():
-        raise _wrong(where, f"must be printable text, not {value!r}")
-    return value
-
-
-def _name(value: Any, where: str) -> str:
-    if not is_name(value):
-        raise _wrong(where, f"must be a name, not {value!a}", hint=f"names have {ALPHABET}")
-    return str(value)
-
-
-def _sentence(value: Any, where: str) -> str:
-    if not value or not is_sentence(value):
-        raise _wrong(where, f"must be one line of at most {MAX_SENTENCE} printable characters, not {value!a}")
-    return str(value)
-
-
-def _number(value: Any, where: str, minimum: float = -math.inf) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= MAGNITUDE:
-        raise _wrong(where, f"must be a number of at most {MAGNITUDE:g}, not {value!r}")
-    if value < minimum:
-        raise _wrong(where, f"must be at least {minimum:g}, not {value!r}")
-    return float(value)
-
-
-def _integer(value: Any, where: str, minimum: int, maximum: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise _wrong(where, f"must be a whole number, not {value!r}")
-    if value > maximum:
-        raise _wrong(where, f"must be at most {maximum}, not {value}")
-    return int(_number(value, where, minimum))
 
 
 def _packages(value: Any, directory: Path) -> dict[str, Path]:
     if not isinstance(value, dict):
-        raise _wrong("packages", "must map names of packages to directories")
+        raise fields.wrong("packages", "must map names of packages to directories")
     roots = {}
     for name, root in value.items():
-        path = beside(directory, _string(root, f"packages.{name}"))
+        path = beside(directory, fields.string(root, f"packages.{name}"))
         if not path.is_dir():
             hint = "a path that does not begin with / starts at the directory of the scene file"
-            raise _wrong(f"packages.{name}", f"there is no directory {path}", hint=hint)
-        roots[_name(name, "packages")] = path
+            raise fields.wrong(f"packages.{name}", f"there is no directory {path}", hint=hint)
+        roots[fields.name(name, "packages")] = path
     return roots
 
 
 def _srdf(value: Any) -> dict[str, str]:
     if not isinstance(value, dict):
-        raise _wrong("srdf", "must map names of models to SRDF files")
-    return {_name(model, "srdf"): _srdf_file(file, f"srdf.{model}") for model, file in value.items()}
+        raise fields.wrong("srdf", "must map names of models to SRDF files")
+    return {fields.name(model, "srdf"): _srdf_file(file, f"srdf.{model}") for model, file in value.items()}
 
 
 def _srdf_file(value: Any, where: str) -> str:
-    file = _name(value, where)
+    file = fields.name(value, where)
     if not file.endswith(".srdf"):
-        raise _wrong(where, f"must name a file that ends in .srdf, not {file!r}", hint="rename the file")
+        raise fields.wrong(where, f"must name a file that ends in .srdf, not {file!r}", hint="rename the file")
     return file
 
 
 def _configurations(value: Any) -> dict[str, dict[str, float] | tuple[float, ...]]:
     if not isinstance(value, dict):
-        raise _wrong("configurations", "must map names to joint positions")
+        raise fields.wrong("configurations", "must map names to joint positions")
     found: dict[str, dict[str, float] | tuple[float, ...]] = {}
     for name, said in value.items():
         if not is_configuration_name(name):
             hint = f"names have {ALPHABET}, but no commas; a number and {Q_STAR} are none"
-            raise _wrong("configurations", f"{name!a} cannot be the name of a configuration", hint=hint)
+            raise fields.wrong("configurations", f"{name!a} cannot be the name of a configuration", hint=hint)
         where = f"configurations.{name}"
         if isinstance(said, list):
-            found[name] = tuple(_number(x, f"{where}[{i}]") for i, x in enumerate(said))
+            found[name] = tuple(fields.number(x, f"{where}[{i}]") for i, x in enumerate(said))
         elif isinstance(said, dict) and said:
-            found[name] = {joint: _number(x, f"{where}.{joint}") for joint, x in _by_joint(said, where).items()}
+            found[name] = {joint: fields.number(x, f"{where}.{joint}") for joint, x in _by_joint(said, where).items()}
         else:
-            raise _wrong(where, "must be positions by joint, as in {turn: 0.5}, or a list of numbers, one per joint")
+            raise fields.wrong(where, "must be positions by joint, as in {turn: 0.5}, or a list of numbers, one per joint")
     return found
 
 
@@ -318,20 +235,20 @@ def _q_star(value: Any) -> tuple[float, ...] | None:
     if value is None:
         return None
     if not isinstance(value, list):
-        raise _wrong("q_star", "must be a list of numbers, one per joint")
-    return tuple(_number(x, f"q_star[{i}]") for i, x in enumerate(value))
+        raise fields.wrong("q_star", "must be a list of numbers, one per joint")
+    return tuple(fields.number(x, f"q_star[{i}]") for i, x in enumerate(value))
 
 
 def _by_joint(value: Any, where: str) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise _wrong(where, "must map names of joints to numbers")
-    return {_name(name, where): content for name, content in value.items()}
+        raise fields.wrong(where, "must map names of joints to numbers")
+    return {fields.name(name, where): content for name, content in value.items()}
 
 
 def _position(value: Any, where: str) -> float:
     if isinstance(value, str):
-        raise _wrong(where, f"must be a position, in radians or metres, or the word {SWEPT}, not {value!r}")
-    return _number(value, where)
+        raise fields.wrong(where, f"must be a position, in radians or metres, or the word {SWEPT}, not {value!r}")
+    return fields.number(value, where)
 
 
 def _limits(value: Any) -> dict[str, tuple[float, float]]:
@@ -339,10 +256,10 @@ def _limits(value: Any) -> dict[str, tuple[float, float]]:
     for name, limits in _by_joint(value, "limits").items():
         where = f"limits.{name}"
         if not isinstance(limits, list) or len(limits) != 2:
-            raise _wrong(where, "must be two numbers, [lower, upper], in radians or metres")
-        lower, upper = (_number(limit, f"{where}[{i}]") for i, limit in enumerate(limits))
+            raise fields.wrong(where, "must be two numbers, [lower, upper], in radians or metres")
+        lower, upper = (fields.number(limit, f"{where}[{i}]") for i, limit in enumerate(limits))
         if lower >= upper:
-            raise _wrong(where, f"must have an interior: {lower:g} is not less than {upper:g}", hint="hold a joint by fix")
+            raise fields.wrong(where, f"must have an interior: {lower:g} is not less than {upper:g}", hint="hold a joint by fix")
         found[name] = (lower, upper)
     return found
 
@@ -350,84 +267,86 @@ def _limits(value: Any) -> dict[str, tuple[float, float]]:
 def _padding(value: Any) -> tuple[float, Paddings]:
     """Returns the padding of all pairs, and that of bodies and pairs that have another one."""
     if not isinstance(value, dict):
-        return _number(value, "padding", minimum=0.0), Paddings()
-    _known(value, "padding", ("default", "bodies", "pairs"))
+        return fields.number(value, "padding", minimum=0.0), Paddings()
+    fields.check_known(value, "padding", ("default", "bodies", "pairs"))
     bodies, pairs = value.get("bodies", {}), value.get("pairs", [])
     if not isinstance(bodies, dict):
-        raise _wrong("padding.bodies", "must map names of bodies or geometries to metres")
+        raise fields.wrong("padding.bodies", "must map names of bodies or geometries to metres")
     if not isinstance(pairs, list):
-        raise _wrong("padding.pairs", "must be a list of {pair: [a, b], padding: metres}")
-    found = {_string(name, "padding.bodies"): _number(x, f"padding.bodies.{name}", minimum=0.0) for name, x in bodies.items()}
+        raise fields.wrong("padding.pairs", "must be a list of {pair: [a, b], padding: metres}")
+    found = {fields.string(name, "padding.bodies"): fields.number(x, f"padding.bodies.{name}", minimum=0.0) for name, x in bodies.items()}
     entries = tuple(_padded_pair(entry, f"padding.pairs[{i}]") for i, entry in enumerate(pairs))
-    return _number(value.get("default", 0.0), "padding.default", minimum=0.0), Paddings(found, entries)
+    return fields.number(value.get("default", 0.0), "padding.default", minimum=0.0), Paddings(found, entries)
 
 
 def _padded_pair(value: Any, where: str) -> PaddedPair:
-    entry = _section(value, where, ("pair", "padding"))
+    entry = fields.section(value, where, ("pair", "padding"))
     pair = entry.get("pair")
     if not isinstance(pair, list) or len(pair) != 2:
-        raise _wrong(f"{where}.pair", "must be two names, [a, b]")
-    a, b = (_string(name, f"{where}.pair[{k}]") for k, name in enumerate(pair))
-    return PaddedPair(a, b, _number(entry.get("padding"), f"{where}.padding", minimum=0.0), f"{where}.pair")
+        raise fields.wrong(f"{where}.pair", "must be two names, [a, b]")
+    a, b = (fields.string(name, f"{where}.pair[{k}]") for k, name in enumerate(pair))
+    return PaddedPair(a, b, fields.number(entry.get("padding"), f"{where}.padding", minimum=0.0), f"{where}.pair")
 
 
 def _ignore(value: Any) -> tuple[IgnoreEntry, ...]:
     if not isinstance(value, list):
-        raise _wrong("ignore", "must be a list of pairs of names")
+        raise fields.wrong("ignore", "must be a list of pairs of names")
     entries = []
     for i, entry in enumerate(value):
         where = f"ignore[{i}]"
         reason = "ignored by the scene file"
         if isinstance(entry, dict):
-            _known(entry, where, ("pair", "reason"))
-            reason = _sentence(entry.get("reason", reason), f"{where}.reason")
+            fields.check_known(entry, where, ("pair", "reason"))
+            reason = fields.sentence(entry.get("reason", reason), f"{where}.reason")
             where, entry = f"{where}.pair", entry.get("pair")
         if not isinstance(entry, list) or len(entry) != 2:
-            raise _wrong(where, "must be two names, [a, b] or {pair: [a, b], reason: ...}")
-        a, b = (_string(name, f"{where}[{k}]") for k, name in enumerate(entry))
+            raise fields.wrong(where, "must be two names, [a, b] or {pair: [a, b], reason: ...}")
+        a, b = (fields.string(name, f"{where}[{k}]") for k, name in enumerate(entry))
         entries.append(IgnoreEntry(a, b, reason, where))
     return tuple(entries)
 
 
 def _hulls(value: Any) -> tuple[str, ...]:
     if not isinstance(value, list):
-        raise _wrong("hulls", "must be a list of bodies, such as [arm/link_1]")
-    return tuple(dict.fromkeys(_string(name, f"hulls[{k}]") for k, name in enumerate(value)))
+        raise fields.wrong("hulls", "must be a list of bodies, such as [arm/link_1]")
+    return tuple(dict.fromkeys(fields.string(name, f"hulls[{k}]") for k, name in enumerate(value)))
 
 
 def _decompose(value: Any) -> dict[str, float]:
     if not isinstance(value, dict):
-        raise _wrong("decompose", "must map names of geometries to how they are decomposed, as in {room/walls/bin: {threshold: 0.01}}")
+        raise fields.wrong(
+            "decompose", "must map names of geometries to how they are decomposed, as in {room/walls/bin: {threshold: 0.01}}"
+        )
     found = {}
     for name, said in value.items():
-        where = f"decompose.{_name(name, 'decompose')}"
-        threshold = _section(said, where, ("threshold",)).get("threshold")
-        found[name] = _number(threshold, f"{where}.threshold", minimum=FINEST)
+        where = f"decompose.{fields.name(name, 'decompose')}"
+        threshold = fields.section(said, where, ("threshold",)).get("threshold")
+        found[name] = fields.number(threshold, f"{where}.threshold", minimum=FINEST)
     return found
 
 
 def _arguments(value: Any) -> dict[str, str | int | float | bool]:
     if not isinstance(value, dict):
-        raise _wrong("xacro", "must map names of arguments to text, numbers, true or false")
+        raise fields.wrong("xacro", "must map names of arguments to text, numbers, true or false")
     for name, argument in value.items():
-        _string(name, "xacro")
+        fields.string(name, "xacro")
         if not isinstance(argument, bool | int | float):
-            _sentence(argument, f"xacro.{name}")
+            fields.sentence(argument, f"xacro.{name}")
     return value
 
 
 def _check_directives(node: yaml.Node, name: str) -> None:
     if not isinstance(node, yaml.SequenceNode) or not node.value:
-        raise _wrong("directives", "must be a list of Drake Model Directives with at least one entry")
-    _check_unique(node, "directives")
+        raise fields.wrong("directives", "must be a list of Drake Model Directives with at least one entry")
+    fields.check_unique(node, "directives")
     for i, entry in enumerate(node.value):
         if not isinstance(entry, yaml.MappingNode) or len(entry.value) != 1:
-            raise _wrong(f"directives[{i}]", "must be a mapping with one key, the kind of directive, such as add_model")
+            raise fields.wrong(f"directives[{i}]", "must be a mapping with one key, the kind of directive, such as add_model")
     check_directives(node, name)
     for added in added_files(node):
         if added.file.startswith(("/", "~", "file:")):
             hint = "name a directory above it under packages, and write package://NAME/FILE"
-            raise _wrong("directives", f"line {added.line}: {added.file!a} is not a relative path", hint=hint)
+            raise fields.wrong("directives", f"line {added.line}: {added.file!a} is not a relative path", hint=hint)
 
 
 def for_bundle(path: Path) -> str:
