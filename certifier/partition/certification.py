@@ -31,6 +31,7 @@ from certifier.partition.area import Area
 from certifier.partition.bodies import Bodies
 from certifier.partition.chords import chords
 from certifier.partition.hulls import approach, gaps
+from certifier.partition.scouts import scouted, with_others
 from certifier.partition.search import Report, Search
 from certifier.partition.shared import Shared
 from certifier.partition.subtrees import Subtrees, dealt, open_cells, put_together
@@ -47,9 +48,6 @@ from certifier.verify.witness import check_witness
 
 GROUP_CELLS = 8
 """Volumes of several geometries are given up after this many cells."""
-NEAR_CONTACTS = 48
-"""To find how far a contact reaches, this many configurations about it are looked at, at each of SCALES."""
-SCALES = (0.5, 0.2, 0.07, 0.02)
 NEAR, POINTS_OF_A_CELL = 0.002, 8
 """Points of an open cell are named at which the bodies are as near as this, relative to their extent, and one at least."""
 AROUND = 0.1
@@ -108,7 +106,6 @@ class CellCertification:
         self._area = Area.of(scene, polytope, seed, box, finer)
         check_ground(scene, self._area.ground)
         check_interior(scene, self._area.ground, self._area.center)
-        self._covariance = np.cov(self._area.samples.T).reshape(scene.n, scene.n)
         self._shared = Shared(self._area)
         self._broad_phase = BroadPhase(Kinematics.of(scene), self._attempt)
         self._last: tuple[int, Sequence[Sequence[bytes]], PartitionProof] | None = None
@@ -139,7 +136,7 @@ class CellCertification:
         """
         start, volumes = time.perf_counter(), self._volumes(index)
         search = Search(self._area, self._shared, volumes, self._keep)
-        given, contacts = dealt(open_cells(left), part, parts), search.scout(1 + part)
+        given, contacts = dealt(open_cells(left), part, parts), scouted(self._area, search.bodies, 1 + part)
         report = search.run(given, cells)
         result = self._left(search, volumes, given, replace(report, contacts=contacts + report.contacts), cut_off)
         return replace(result, seconds=time.perf_counter() - start)
@@ -176,13 +173,13 @@ class CellCertification:
 
     def _begin(self, volumes: Volumes, cells: int, cut_off: CutOff, former: PartitionProof | None) -> PairResult:
         area, search = self._area, Search(self._area, self._shared, volumes, self._keep)
-        contacts = search.scout(0)
+        contacts = scouted(area, search.bodies, 0)
         root = Node() if former is None else try_again(area, search, volumes, former)
         given = [OpenCell(root, area.lower, area.upper)]
         report = Report(contacts=contacts) if contacts else search.run(root.open_cells(area.lower, area.upper), cells)
         if any(node.kind == OPEN for node in root.preorder()):
             if self._keep is None and not report.contacts:  # where faces are added, every round looks again
-                looks = (search.scout(seed) for seed in range(1, 1 + LOOKS_AGAIN))
+                looks = (scouted(area, search.bodies, seed) for seed in range(1, 1 + LOOKS_AGAIN))
                 report = replace(report, contacts=next(filter(None, looks), []))
             return self._left(search, volumes, given, report, cut_off)
         return self._verified(self._proof(search, volumes, root))
@@ -207,7 +204,7 @@ class CellCertification:
         """Returns the result of a pair that is not certified yet, with what its search has left."""
         left = Subtrees.of(given, len(self._area.ground.d))
         cells = [(lower, upper) for _, lower, upper in left.open_cells]
-        points = self._contacts(search, report.contacts)
+        points = with_others(self._area, search.bodies, search.joints, report.contacts)
         contacts = min(len(points), MOST_POINTS)
         bodies = search.bodies
         if cut_off is not CutOff.CONTACTS or search.parted is not None:
@@ -258,20 +255,6 @@ class CellCertification:
             detail = f"the contact found does not hold: {error}"
             return replace(found, outcome=Outcome.TOO_CLOSE, witness_s=s, detail=detail)
         return replace(found, outcome=Outcome.REFUTED, witness_s=s, proof=witness.to_bytes())
-
-    def _contacts(self, search: Search, contacts: list[Array]) -> list[Array]:
-        """Returns the contacts with others about them, which show how far a contact reaches."""
-        found: list[Array] = []
-        rng = np.random.default_rng(len(contacts))
-        polytope, J = self._area.polytope, search.joints
-        root = np.linalg.cholesky(self._covariance[np.ix_(J, J)] + 1e-12 * np.eye(len(J)))
-        for contact in contacts:
-            near = np.tile(contact, (len(SCALES) * NEAR_CONTACTS, 1))
-            scales = np.repeat(SCALES, NEAR_CONTACTS)[:, None]
-            near[:, J] += scales * rng.normal(size=(len(near), len(J))) @ root.T / np.sqrt(len(J))
-            near = near[polytope.contains(near)]
-            found += [contact, *near[gaps(*search.bodies.hulls, near) <= 0]]
-        return found
 
     def _of_cells(self, search: Search, cells: Sequence[OpenCell], cut_off: CutOff) -> tuple[Bodies, list[Array]]:
         """Returns the bodies that faces will keep apart, and points of the polytope in the cells where these are near.

@@ -28,7 +28,6 @@ from certifier.model import Array, Volume
 from certifier.partition.area import Area
 from certifier.partition.bodies import TOUCH, Bodies, Separated, Undecided
 from certifier.partition.cell import KEPT, Cell
-from certifier.partition.chords import chords
 from certifier.partition.frames import choose_frame
 from certifier.partition.hulls import gaps
 from certifier.partition.levels import MANY_JOINTS, Level, levels_of
@@ -66,9 +65,6 @@ BEYOND = 1e-9
 """A point may lie beyond a face by this."""
 FEW = 16
 """At most this many points of a narrow cell are reported."""
-SCOUTS, AMONG, SCOUT_STEPS = 64, 16, 12
-"""Before cells are looked at, a search for contacts starts from SCOUTS points and takes SCOUT_STEPS steps. Of AMONG times as many points,
-these are the ones where bodies are nearest. A contact that is not found costs many cells, because those about it cannot be proved."""
 
 
 @dataclass
@@ -156,20 +152,6 @@ class Search:
             self._separated(cell, level, found)
         else:
             self._start(cell)
-
-    def scout(self, seed: int) -> list[Array]:
-        """Returns contacts that a look at all of the polytope finds, (n,) each; other seeds look elsewhere."""
-        area, contacts = self._area, []
-        cell = Cell.at(area, Node(), area.lower, area.upper, area.samples)
-        rng, count = np.random.default_rng(seed), SCOUTS * AMONG // 4
-        targets = np.where(rng.random((count, len(area.lower))) < 0.5, area.lower, area.upper)
-        samples = area.samples[rng.permutation(len(area.samples))[:count]]
-        X = np.concatenate([samples, chords(cell.inside.C, cell.inside.d, area.center, targets, count, seed)])
-        for place in np.argsort(gaps(*self.bodies.hulls, X), kind="stable")[:SCOUTS]:
-            s, gap = self.bodies.approached(cell, X[place], SCOUT_STEPS)
-            if gap <= 0:
-                contacts.append(s)
-        return contacts
 
     def _parted(self, levels: list[Level], keep: Array) -> Bodies | None:
         if self._two_chains:

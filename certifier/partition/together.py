@@ -117,17 +117,17 @@ def _will_do(scene: Scene, first: list[Geometry], second: list[Geometry], sample
     kinematics = Kinematics.of(scene)
     one, other = _volume(kinematics, first), _volume(kinematics, second)
     own = [(Volume.of(a), Volume.of(b)) for a in first for b in second]
-    room = np.min([_gaps(scene, a, b, keep) for a, b in own], axis=0)
-    if (_gaps(scene, one, other, keep) <= ROOM * room).any():
+    room = np.min([gaps_between(scene, a, b, keep) for a, b in own], axis=0)
+    if (gaps_between(scene, one, other, keep) <= ROOM * room).any():
         return False
-    touching = samples[_gaps(scene, one, other, samples) <= 0]
+    touching = samples[gaps_between(scene, one, other, samples) <= 0]
     excused = np.zeros(len(touching), dtype=bool)
     for a, b in own if len(touching) else []:
-        excused |= _gaps(scene, a, b, touching) <= 0
+        excused |= gaps_between(scene, a, b, touching) <= 0
     return bool((~excused).sum() <= LOST * len(samples))
 
 
-def _gaps(scene: Scene, one: Volume, other: Volume, X: Array) -> Array:
+def gaps_between(scene: Scene, one: Volume, other: Volume, X: Array) -> Array:
     """Returns how far two volumes are apart at configurations, (N,), in metres, padding subtracted; not positive where they touch."""
     kinematics = Kinematics.of(scene)
     padding = scene.padding_between((one, other))

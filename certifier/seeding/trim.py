@@ -24,6 +24,7 @@ from certifier.polytopes.gibbs import uniform_in_q
 from certifier.polytopes.sampling import hit_and_run
 from certifier.seeding.coarse_pairs import coarse_pairs_of, with_coarse_pairs
 from certifier.seeding.contacts import Contacts
+from certifier.seeding.corners import without_contacts
 from certifier.seeding.options import SeedOptions
 
 EACH = 40
@@ -64,6 +65,7 @@ def trimmed(scene: Scene, polytope: Polytope, points: Array, options: SeedOption
     passed, whole = trim.until_few(wider, of_all, few), trim.polytope
     for size in SIZES:
         trim.until_few(scene, partial(of_copy, size), FEW)
+    trim.polytope = without_contacts(scene, trim.polytope, points)
     if trim.polytope is not whole:
         passed = trim.until_few(wider, of_all, few)
     return trim.polytope, passed

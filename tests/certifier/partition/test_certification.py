@@ -14,9 +14,10 @@ from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Polytope
 from certifier.outcome import Outcome, Stage
 from certifier.pair.certification import certify_pair
 from certifier.pair.closest import first_within
-from certifier.partition import bodies
+from certifier.partition import bodies, certification
 from certifier.partition.area import Area
 from certifier.partition.certification import CellCertification, CutOff
+from certifier.partition.scouts import scouted
 from certifier.partition.search import Search
 from certifier.partition.shared import Shared
 from certifier.partition.subtrees import open_cells
@@ -280,7 +281,7 @@ def test_what_was_begun_goes_on_when_a_face_has_cut_the_contact_off(monkeypatch)
     around = ProvedBox.of_program(scene, polytope)
     with monkeypatch.context() as patched:
         # A search that does not look for contacts proves some cells before one is met.
-        patched.setattr(Search, "scout", lambda *_: [])
+        patched.setattr(certification, "scouted", lambda *_: [])
         patched.setattr(bodies, "CLOSE", -1.0)
         blind = certify(scene, polytope, cells=20, box=around)
     assert blind.outcome is Outcome.INCONCLUSIVE
@@ -469,7 +470,7 @@ def test_contacts_in_a_small_corner_are_looked_for_again(half, outcome):
     if outcome is Outcome.REFUTED:
         check_refuted(scene, polytope, index, result)
         area = Area.of(scene, polytope, 0)
-        assert not Search(area, Shared(area), volumes_of(scene, [scene.pairs[index]])).scout(0)
+        assert not scouted(area, Search(area, Shared(area), volumes_of(scene, [scene.pairs[index]])).bodies, 0)
 
 
 def test_an_empty_polytope_is_refused():
