@@ -75,13 +75,17 @@ class Kinematics:
         """Returns the factors of X_FB from frame body F to body B, in path order."""
         if (frame, body) in self._paths:
             return self._paths[frame, body]
-        bodies = self.bodies_between(frame, body)
-        factors = []
-        for here, there in itertools.pairwise(bodies):
-            inverse = self.scene.joint_above.get(here) is not None and self.scene.joint_above[here].parent == there
-            factors.append(_factor(self.scene.joint_above[here if inverse else there], self.scene.q_star, inverse))
+        factors = [_factor(joint, self.scene.q_star, upwards) for joint, upwards in self.joints(frame, body)]
         self._paths[frame, body] = factors
         return factors
+
+    def joints(self, frame: str, body: str) -> list[tuple[Joint, bool]]:
+        """Returns the joints from F to B, in path order, each with whether it is crossed upwards, from child to parent."""
+        above, found = self.scene.joint_above, []
+        for here, there in itertools.pairwise(self.bodies_between(frame, body)):
+            upwards = here in above and above[here].parent == there
+            found.append((above[here if upwards else there], upwards))
+        return found
 
     def chain(self, frame: str, body: str) -> list[int]:
         """Returns the position indices of the joints between F and B, in path order."""

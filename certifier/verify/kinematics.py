@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from flint import arb, ctx, fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpq_poly
 
+from certifier.errors import ProofError
 from certifier.model import WORLD, Array, Joint, JointKind, Scene
 
 Matrix = list[list[fmpq_mpoly]]
@@ -70,11 +71,19 @@ class ExactKinematics:
         return cls(scene, [fmpq_poly([0, 1])] * scene.n, lambda x: fmpq_poly([x]))
 
     def path(self, frame: str, body: str) -> list[tuple[Joint, bool]]:
-        """Returns the joints from the frame's body to the body, each with whether it is crossed upwards, from child to parent."""
+        """Returns the joints from the frame's body to the body, each with whether it is crossed upwards, from child to parent.
+
+        Raises:
+            ProofError: two of the joints have the same position. What is computed here would hold, but not what is made of it: that a
+                polynomial has at most the degree 2 in a position.
+        """
         up, down = self._to_world(frame), self._to_world(body)
         while up and down and up[-1] is down[-1]:
             up.pop()
             down.pop()
+        positions = [joint.index for joint in (*up, *down) if joint.index is not None]
+        if len({*positions}) < len(positions):
+            raise ProofError("proof_model", f"two joints between {frame} and {body} move together, which no proof of a pair may use")
         return [(joint, True) for joint in up] + [(joint, False) for joint in reversed(down)]
 
     def _to_world(self, body: str) -> list[Joint]:

@@ -57,6 +57,7 @@ class RegionStatement:
             f"scene of hash {scene.hash}",
             f"{scene.n} {'joint' if scene.n == 1 else 'joints'}, within their limits:",
             *joints,
+            *(f"  '{j.name}' moves with '{scene.moving[j.index or 0].name}'" for j in scene.following),
             f"a bounded, non-empty polytope of {self.faces} half-spaces in tangent space; |s|^2 <= {rounded_up(self.N, 6)}",
             f"{len(self.gaps)} pairs of bodies separated at every configuration of it",
             *paddings(scene),

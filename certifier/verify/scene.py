@@ -15,6 +15,7 @@ from certifier.errors import ProofError
 from certifier.model import WORLD, Joint, JointKind, Scene
 from certifier.names import escaped, is_name, is_sentence
 from certifier.proof import limits
+from certifier.verify.kinematics import ExactKinematics
 
 RIGID = 1e-9
 """The numbers of a rotation or of an axis may be this far from orthonormal; those of a parsed model are within about 1e-16."""
@@ -83,9 +84,30 @@ def _check_tree(scene: Scene) -> None:
             _require(above[path[-1]] == WORLD or above[path[-1]] in above, f"the parent of {path[-1]} is no body")
             path.append(above[path[-1]])
     _require(scene.q_star.size, "no joint of it moves")
-    positions = [joint.index for joint in scene.joints if joint.index is not None]
+    positions = [joint.index for joint in scene.joints if joint.index is not None and not joint.follows]
     _require(scene.q_star.shape == (len(positions),) and (np.abs(scene.q_star) <= limits.MAGNITUDE).all(), "q*")
     _require(all(type(i) is int for i in positions) and sorted(positions) == list(range(scene.n)), "the joints' positions")
+    for joint in scene.following:
+        _require(type(joint.index) is int and 0 <= joint.index < scene.n, f"the position of {joint.name}")
+        leader = scene.moving[joint.index or 0]
+        same = all(getattr(joint, what) == getattr(leader, what) for what in ("kind", "lower", "upper", "own_limits"))
+        _require(same, f"{joint.name}, which follows a joint of another kind or with other limits")
+    if scene.following:
+        _check_no_position_twice(scene)
+
+
+def _check_no_position_twice(scene: Scene) -> None:
+    """Refuses two joints of one position between the world and a body, and between the geometries of a pair.
+
+    All checks take the joints on a way for independent ones.
+    """
+    kinematics, body = ExactKinematics.by_joint(scene), {geometry.name: geometry.body for geometry in scene.geometries}
+    ways = {(WORLD, name) for name in scene.bodies} | {(body[p.a], body[p.b]) for p in scene.pairs if p.a in body and p.b in body}
+    for one, other in sorted(ways):
+        try:
+            kinematics.path(one, other)
+        except ProofError:
+            _require(False, f"two joints between {one} and {other} move together")
 
 
 def _check_joint(scene: Scene, joint: Joint) -> None:
