@@ -121,11 +121,12 @@ def _group(couplings: Sequence[Coupling]) -> list[Coupling]:
 
 
 def _leader(group: Sequence[Coupling], order: Sequence[str]) -> str:
-    """Returns the joint that others follow and that follows none; where models leave that open, the one that most others follow."""
+    """Returns the joint that others follow and that follows none. With a factor of -1 it is not known which of two that is."""
     names = sorted({name for coupling in group for name in coupling.factors}, key=order.index)
-    followers = {mimic.follower for mimic in map(mimic_of, group) if mimic is not None}
+    known = [mimic for mimic in map(mimic_of, group) if mimic is not None and mimic.factor != -1]
+    leaders, followers = {mimic.leader for mimic in known}, {mimic.follower for mimic in known}
     free = [name for name in names if name not in followers]
-    return max(free or names, key=lambda name: sum(name in coupling.factors for coupling in group))
+    return max(free or names, key=lambda name: (name in leaders, sum(name in coupling.factors for coupling in group)))
 
 
 def _check(follower: Joint, leader: Joint, mimic: Mimic) -> None:
@@ -147,8 +148,11 @@ def _still(joint: str) -> str:
 
 def _within(mimic: Mimic, lower: float, upper: float) -> tuple[float, float]:
     """Returns the leader's positions at which the follower is within its limits, rounded inwards."""
-    ends = sorted(mimic.factor * (limit - mimic.offset) for limit in (lower, upper))
-    return (ends[0], ends[1]) if mimic.offset == 0 else (float(np.nextafter(ends[0], np.inf)), float(np.nextafter(ends[1], -np.inf)))
+    first, last = sorted(mimic.factor * (limit - mimic.offset) for limit in (lower, upper))
+    if mimic.offset == 0:
+        return first, last
+    inwards = (float(np.nextafter(end, to)) if np.isfinite(end) else end for end, to in ((first, np.inf), (last, -np.inf)))
+    return next(inwards), next(inwards)
 
 
 def _following(joint: Joint, leader: Joint, mimic: Mimic) -> Joint:
