@@ -65,7 +65,7 @@ def check_independent(scene: Scene) -> None:
     """
     if scene.following:
         message = f"joint {scene.following[0].name} follows another one, and Drake's methods for regions have independent joints only"
-        raise SceneError("unsupported_joint", message, field="scene", hint="choose another method, or hold or sweep the joints by fix")
+        raise SceneError("unsupported_joint", message, hint="choose another method, or hold or sweep the joints by fix")
 
 
 def drake_name(name: str) -> str:

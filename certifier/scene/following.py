@@ -143,7 +143,7 @@ def _refused(leader: str, names: Sequence[str], how: str) -> SceneError:
 
 
 def _still(joint: str) -> str:
-    return f"hold one, as in fix: {{{joint}: 0}}, or sweep it, as in fix: {{{joint}: swept}}"
+    return f"hold one of them, as in fix: {{{joint}: 0}}, or sweep it, as in fix: {{{joint}: swept}}"
 
 
 def _within(mimic: Mimic, lower: float, upper: float) -> tuple[float, float]:
