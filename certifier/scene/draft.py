@@ -307,7 +307,7 @@ def _fix(held: Mapping[str, Any]) -> list[str]:
     lines = [f"  {quoted(joint)}: {position:.12g}" for joint, position in rest.items() if joint not in followers]
     said = [
         "# Other joints mimic these, so they are held, and the others with them. Choose where, or write swept for all positions at once.",
-        "# Take a line out, and the joint moves and takes the others with it, as far as docs/scenes.md says (A gripper).",
+        "# Take a line out, and the joint moves and takes the others with it, if docs/scenes.md allows it; q_star needs a number for it.",
     ]
     return [*said, "fix:", *lines] if lines else []
 

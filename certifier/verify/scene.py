@@ -33,6 +33,13 @@ def check_scene(scene: Scene) -> None:
     for joint in scene.joints:
         _check_joint(scene, joint)
     _check_bodies(scene)
+    if scene.following:
+        _check_no_position_twice(scene)
+
+
+def following(scene: Scene) -> list[str]:
+    """Returns a line for each joint that follows another one."""
+    return [f"  '{joint.name}' moves with '{scene.moving[joint.index or 0].name}'" for joint in scene.following]
 
 
 def _require(condition: Any, problem: str) -> None:
@@ -92,8 +99,6 @@ def _check_tree(scene: Scene) -> None:
         leader = scene.moving[joint.index or 0]
         same = all(getattr(joint, what) == getattr(leader, what) for what in ("kind", "lower", "upper", "own_limits"))
         _require(same, f"{joint.name}, which follows a joint of another kind or with other limits")
-    if scene.following:
-        _check_no_position_twice(scene)
 
 
 def _check_no_position_twice(scene: Scene) -> None:
@@ -102,7 +107,7 @@ def _check_no_position_twice(scene: Scene) -> None:
     All checks take the joints on a way for independent ones.
     """
     kinematics, body = ExactKinematics.by_joint(scene), {geometry.name: geometry.body for geometry in scene.geometries}
-    ways = {(WORLD, name) for name in scene.bodies} | {(body[p.a], body[p.b]) for p in scene.pairs if p.a in body and p.b in body}
+    ways = {(WORLD, name) for name in scene.bodies} | {(body[pair.a], body[pair.b]) for pair in scene.pairs}
     for one, other in sorted(ways):
         try:
             kinematics.path(one, other)

@@ -14,24 +14,32 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.geometry import SceneGraph
 
+from api.drawing import model
 from certifier.errors import ProofError, SceneError
 from certifier.growth.options import GrowthOptions
 from certifier.jobs.local import grow
+from certifier.jobs.motion import certify
+from certifier.jobs.reference import Reference
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, JointKind, Pair, Polytope, Scene
 from certifier.motion.bodies import bodies_of, place_links
+from certifier.outcome import Outcome
 from certifier.polytopes.polytope import chebyshev_center
 from certifier.polytopes.sampling import hit_and_run
+from certifier.proof.motion import Motion, Space
 from certifier.scene import following
 from certifier.scene.contacts import touching
 from certifier.scene.joints import Coupling, centered
 from certifier.scene.names import Names
 from certifier.scene.parse import joint_of
 from certifier.scene.tree import Tree
+from certifier.seeding.options import Method, SeedOptions
+from certifier.seeding.propose import propose
 from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.places import Places
 from certifier.verify.region import verify_region
 from certifier.verify.scene import check_scene
+from certifier.verify.uncovered import Why, document
 from tests.certifier.scene.test_sweep import finger, knuckles, mimic, slides
 from tests.certifier.scene.workshop import parsed, write
 from tests.oracles.original import original_diagram
@@ -295,6 +303,8 @@ def test_the_verifier_refuses_joints_that_move_together_on_one_way(tmp_path):
     )
     with pytest.raises(ProofError, match="move together"):
         check_scene(behind)
+    with pytest.raises(ProofError, match="the body of"):
+        check_scene(replace(scene, geometries=(replace(scene.geometries[0], body="arm/nothing"), *scene.geometries[1:])))
     for way in (ExactKinematics.by_joint(scene).path, Places(scene).chain):
         way("arm/grip_link", "room/walls")
         with pytest.raises(ProofError, match="move together"):
@@ -338,6 +348,41 @@ def gripper(tmp_path: Path, at: float) -> tuple[Path, Scene]:
     ignored = "ignore: [{pair: [arm/grip_link, arm/other_link], reason: they grasp}, {pair: [arm/hand, room/walls], reason: r}]\n"
     path = write(tmp_path, GRIPPER, arm=arm, files={"room.sdf": room}, extra=ignored)
     return path, parsed(path)
+
+
+def test_a_motion_is_proved_to_where_the_finger_that_follows_meets_the_post(tmp_path):
+    """The pad's outside is at y = -0.03 - grip, and the post begins at -0.08."""
+    path, scene = gripper(tmp_path, -0.09)
+    drake = Original(path, {"arm/other": ("arm/grip", 1, 0.0)})
+    for end, proved in ((0.049, True), (0.06, False)):
+        motion = Motion(Space.Q, np.array([[0.0, 0.0], [0.0, end]]))
+        verdict = certify(scene, motion)
+        assert (verdict.outcome is Outcome.CERTIFIED) is proved
+        drake.place(scene, motion.controls[-1])
+        assert bool(drake.touching(scene)) is not proved
+    assert verdict.stop is not None
+    assert 0.06 * verdict.stop.time == pytest.approx(0.05, abs=1e-3)
+    assert "  'arm/other' moves with 'arm/grip'" in certify(scene, Motion(Space.Q, np.array([[0.0, 0.0], [0.0, 0.03]]))).statement.lines()
+
+
+def test_drakes_methods_have_independent_joints_only(tmp_path):
+    _, scene = gripper(tmp_path, -0.09)
+    for ask in (lambda: Reference(scene), lambda: propose(scene, SeedOptions(Method.IRIS_NP2, q=(0.0, 0.01)))):
+        with pytest.raises(SceneError, match="joint arm/other follows another one"):
+            ask()
+
+
+def test_what_draws_the_robot_is_told_which_joints_follow(tmp_path):
+    _, scene = gripper(tmp_path, -0.09)
+    drawn = model("id", scene)
+    assert [(joint.name, joint.index) for joint in drawn.joints if joint.follows] == [("arm/other", 1)]
+    assert len(drawn.units) == scene.n == 2
+
+
+def test_bodies_that_a_follower_joins_are_neighbours_that_are_not_covered(tmp_path):
+    _, scene = gripper(tmp_path, -0.09)
+    said = [(one["a"], one["b"]) for one in document(scene)["bodies"] if one["why"] == Why.NEIGHBOURS]
+    assert ("arm/hand", "arm/other_link") in said
 
 
 def test_a_region_whose_fingers_move_is_free_and_the_post_is_found(tmp_path):
