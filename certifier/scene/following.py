@@ -95,9 +95,11 @@ def check_ways(scene: Scene) -> None:
             message = f"joints {' and '.join(twice)} move together, and one is behind the other, which is not supported"
             raise SceneError("unsupported_joint", message, field="directives", hint=_still(twice[0]))
     for pair in scene.pairs:
-        if twice := _twice(scene, *(scene.geometry(name).body for name in (pair.a, pair.b))):
+        bodies = [scene.geometry(name).body for name in (pair.a, pair.b)]
+        if twice := _twice(scene, bodies[0], bodies[1]):
             message = f"joints {' and '.join(twice)} move together, and both are between {pair.a} and {pair.b}, which is not supported"
-            hint = f"{_still(twice[0])}; or ignore the pair, with a reason: nothing is certified about it then"
+            ignored = f"ignore: [{{pair: [{', '.join(bodies)}], reason: REASON}}]"
+            hint = f"{_still(twice[0])}; or certify nothing about these bodies, by {ignored}"
             raise SceneError("unsupported_joint", message, field="directives", hint=hint)
 
 
