@@ -35,7 +35,7 @@ def choose_frame(kinematics: Kinematics, volumes: tuple[Volume, Volume], lower: 
         longest = max(len(chain) for _, chain in chains)
         return max(longest - MOST_JOINTS, 0), sum(reach[j, body] for body, chain in chains for j in chain)
 
-    return min(kinematics.bodies_between(a.body, b.body), key=cost), sorted(kinematics.chain(a.body, b.body))
+    return min(kinematics.frames(a.body, b.body), key=cost), sorted(kinematics.chain(a.body, b.body))
 
 
 def _reach(kinematics: Kinematics, joint: Joint, volume: Volume, s: Array) -> float:

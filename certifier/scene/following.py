@@ -16,7 +16,7 @@ import numpy as np
 
 from certifier.errors import SceneError
 from certifier.kinematics import Kinematics
-from certifier.model import WORLD, Joint, Scene
+from certifier.model import WORLD, Joint, JointKind, Scene
 from certifier.scene.joints import Coupling, motion, range_of
 from certifier.scene.mimics import Mimic, mimic_of
 
@@ -83,7 +83,9 @@ def with_followers(leaders: Sequence[Joint], every: Sequence[Joint], followers: 
 
 
 def check_ways(scene: Scene) -> None:
-    """Refuses joints that move together and are on one way: from the world to a body, or between the bodies of a pair.
+    """Refuses joints that move together and are on one way: from the world to a body, and between the bodies of a pair.
+
+    Slides between the bodies of a pair are taken as one, if no other joint that moves is between them.
 
     Raises:
         SceneError: ``unsupported_joint``.
@@ -91,12 +93,12 @@ def check_ways(scene: Scene) -> None:
     if not scene.following:
         return
     for body in scene.bodies:
-        if twice := _twice(scene, WORLD, body):
+        if twice := _twice(_moving(scene, WORLD, body)):
             message = f"joints {' and '.join(twice)} move together, and one is behind the other, which is not supported"
             raise SceneError("unsupported_joint", message, field="directives", hint=_still(twice[0]))
     for pair in scene.pairs:
         bodies = [scene.geometry(name).body for name in (pair.a, pair.b)]
-        if twice := _twice(scene, bodies[0], bodies[1]):
+        if twice := _twice(_slides_as_one(_moving(scene, bodies[0], bodies[1]))):
             message = f"joints {' and '.join(twice)} move together, and both are between {pair.a} and {pair.b}, which is not supported"
             ignored = f"ignore: [{{pair: [{', '.join(bodies)}], reason: REASON}}]"
             hint = f"{_still(twice[0])}; or certify nothing about these bodies, by {ignored}"
@@ -163,12 +165,24 @@ def _following(joint: Joint, leader: Joint, mimic: Mimic) -> Joint:
     return Joint(joint.name, joint.kind, joint.parent, joint.child, mimic.factor * joint.axis + 0.0, X_PF, joint.X_BM, *own, follows=True)
 
 
-def _twice(scene: Scene, one: str, other: str) -> tuple[str, str] | None:
-    """Returns two joints between two bodies that have the same position."""
-    seen: dict[int, str] = {}
-    for joint, _ in Kinematics.of(scene).joints(one, other):
-        if joint.index is None:
-            continue
+def _moving(scene: Scene, one: str, other: str) -> list[Joint]:
+    """Returns the joints that move between two bodies, in path order."""
+    return [joint for joint, _ in Kinematics.of(scene).joints(one, other) if joint.index is not None]
+
+
+def _slides_as_one(joints: Sequence[Joint]) -> list[Joint]:
+    """Returns the joints without slides that come right after one with the same position."""
+    return [
+        joint
+        for before, joint in zip((None, *joints), joints, strict=False)
+        if before is None or before.index != joint.index or joint.kind is not JointKind.PRISMATIC
+    ]
+
+
+def _twice(joints: Sequence[Joint]) -> tuple[str, str] | None:
+    """Returns two joints with the same position."""
+    seen: dict[int | None, str] = {}
+    for joint in joints:
         if joint.index in seen:
             return seen[joint.index], joint.name
         seen[joint.index] = joint.name

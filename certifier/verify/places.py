@@ -74,8 +74,6 @@ class Places:
             while up and down and up[-1] == down[-1]:
                 up.pop()
                 down.pop()
-            if len({self._above[root].index for root in (*up, *down)}) < len(up) + len(down):
-                raise ProofError("proof_model", f"two joints between {frame} and {body} move together, which no proof of a pair may use")
             crossed = [(self._above[root], -1.0) for root in up] + [(self._above[root], 1.0) for root in reversed(down)]
             places = [_Place("body", frame)]
             for joint, sign in crossed:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from dataclasses import replace
 from fractions import Fraction
@@ -36,12 +37,11 @@ from certifier.scene.tree import Tree
 from certifier.seeding.options import Method, SeedOptions
 from certifier.seeding.propose import propose
 from certifier.verify.kinematics import ExactKinematics, exact
-from certifier.verify.places import Places
 from certifier.verify.region import verify_region
 from certifier.verify.scene import check_scene
 from certifier.verify.uncovered import Why, document
 from tests.certifier.scene.test_sweep import finger, knuckles, mimic, slides
-from tests.certifier.scene.workshop import parsed, write
+from tests.certifier.scene.workshop import LIMIT, parsed, write
 from tests.oracles.original import original_diagram
 from tests.oracles.trees import random_plant
 
@@ -52,6 +52,13 @@ def jaws(kind: str, factor: float, offset: float, limits: tuple[float, float] = 
     """Two fingers on the hand, of which the second one follows the first one; both are turned against it."""
     other = finger("other", "hand", kind, "0.6 0.8 0", own, "box", mimic("grip", factor, offset), "0.2 0.1 0.3")
     return finger("grip", "hand", kind, "0 -0.6 0.8", limits, "box") + other
+
+
+WRIST = jaws("prismatic", 1, 0.0).replace(
+    '<joint name="grip" type="prismatic"><parent link="hand"/>', '<joint name="grip" type="prismatic"><parent link="w"/>'
+)
+WRIST += f"""<link name="w"/><joint name="wrist" type="revolute"><parent link="hand"/><child link="w"/><axis xyz="0 0 1"/>{LIMIT}</joint>"""
+"""One of two fingers that slide is behind another joint."""
 
 
 class Original:
@@ -142,7 +149,7 @@ def test_drake_has_every_body_where_ciris_has_it(tmp_path, hand):
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**31), st.integers(3, 9))
 def test_random_trees_with_random_couplings_are_where_drake_has_them(seed, bodies):
-    """Also where joints that move together are on one way: of this, the prover's kinematics have the pose, and the verifier refuses it."""
+    """Where joints that move together are on one way, the verifier refuses it, unless they are slides without another joint between."""
     rng = np.random.default_rng(seed)
     plant = random_plant(rng, bodies)
     names = Names(plant, SceneGraph().model_inspector())
@@ -167,15 +174,20 @@ def test_random_trees_with_random_couplings_are_where_drake_has_them(seed, bodie
             assert joint.lower - 1e-12 <= at[joint.name] <= joint.upper + 1e-12
             positions[joint.index] = at[joint.name]
     plant.SetPositions(context, positions)
-    for body in scene.bodies[1:]:
-        expected = plant.EvalBodyPoseInWorld(context, plant.GetBodyByName(body.split("/")[1])).GetAsMatrix4()
-        np.testing.assert_allclose(our_pose(scene, q, WORLD, body), expected, rtol=0, atol=1e-11)
-        indices = [joint.index for joint, _ in Kinematics.of(scene).joints(WORLD, body) if joint.index is not None]
-        if len({*indices}) == len(indices):
-            np.testing.assert_allclose(exact_pose(scene, q, WORLD, body), expected, rtol=0, atol=1e-11)
+    for frame, body in itertools.product(scene.bodies, repeat=2):
+        ends = [plant.world_body() if name == WORLD else plant.GetBodyByName(name.split("/")[1]) for name in (frame, body)]
+        expected = plant.CalcRelativeTransform(context, *(end.body_frame() for end in ends)).GetAsMatrix4()
+        np.testing.assert_allclose(our_pose(scene, q, frame, body), expected, rtol=0, atol=1e-11)
+        moving = [(joint.index, joint.kind) for joint, _ in Kinematics.of(scene).joints(frame, body) if joint.index is not None]
+        apart = [one for i, one in enumerate(moving) if i == 0 or one != moving[i - 1] or one[1] is JointKind.REVOLUTE]
+        if len({*apart}) == len(apart):
+            np.testing.assert_allclose(exact_pose(scene, q, frame, body), expected, rtol=0, atol=1e-11)
+            assert Kinematics.of(scene).chain(frame, body) == [index for index, _ in apart]
+            factors = ExactKinematics.by_joint(scene).factors(frame, body)
+            assert [index for index, _ in factors if index is not None] == [index for index, _ in apart]
         else:
             with pytest.raises(ProofError, match="move together"):
-                ExactKinematics.at(scene, [fmpq(0)] * scene.n).pose(WORLD, body)
+                ExactKinematics.at(scene, [fmpq(0)] * scene.n).pose(frame, body)
 
 
 def ranged(every, followers):
@@ -234,7 +246,8 @@ def test_limits_are_those_at_which_all_are_within_theirs(tmp_path):
         (slides("box"), "", "unsupported_joint", "arm/grip and arm/other are coupled (mimic) with the multiplier 1.5"),
         (jaws("revolute", 2, 0.0), IGNORED, "unsupported_joint", "with the multiplier 2"),
         (jaws("prismatic", 1, 0.0).replace("prismatic", "revolute", 1), IGNORED, "unsupported_joint", "one slides and the other turns"),
-        (jaws("prismatic", 1, 0.0), "", "unsupported_joint", "both are between arm/grip_link/pad and arm/other_link/pad"),
+        (jaws("revolute", 1, 0.0), "", "unsupported_joint", "both are between arm/grip_link/pad and arm/other_link/pad"),
+        (WRIST, "", "unsupported_joint", "both are between arm/grip_link/pad and arm/other_link/pad"),
         (knuckles("box"), "", "unsupported_joint", "one is behind the other"),
         (jaws("prismatic", 1, 3.0), IGNORED, "joint_range", "no range of positions with both within their limits"),
         (jaws("prismatic", 1, 0.0), IGNORED + "limits: {other: [0, 0.1]}\n", "unknown_name", "no joint of the scene that can move"),
@@ -294,7 +307,7 @@ def test_the_verifier_refuses_followers_that_make_no_sense(tmp_path, words, forg
 
 
 def test_the_verifier_refuses_joints_that_move_together_on_one_way(tmp_path):
-    scene = parsed(write(tmp_path, more=jaws("prismatic", 1, 0.0), extra=IGNORED))
+    scene = parsed(write(tmp_path, more=jaws("revolute", 1, 0.0), extra=IGNORED))
     fingers = sorted(geometry.name for geometry in scene.geometries if geometry.body in ("arm/grip_link", "arm/other_link"))
     with pytest.raises(ProofError, match="move together"):
         check_scene(replace(scene, pairs=(*scene.pairs, Pair(*fingers)), ignored=()))
@@ -305,10 +318,41 @@ def test_the_verifier_refuses_joints_that_move_together_on_one_way(tmp_path):
         check_scene(behind)
     with pytest.raises(ProofError, match="the body of"):
         check_scene(replace(scene, geometries=(replace(scene.geometries[0], body="arm/nothing"), *scene.geometries[1:])))
-    for way in (ExactKinematics.by_joint(scene).path, Places(scene).chain):
-        way("arm/grip_link", "room/walls")
-        with pytest.raises(ProofError, match="move together"):
-            way("arm/grip_link", "arm/other_link")
+    ExactKinematics.by_joint(scene).path("arm/grip_link", "room/walls")
+    with pytest.raises(ProofError, match="move together"):
+        ExactKinematics.by_joint(scene).path("arm/grip_link", "arm/other_link")
+
+
+def test_slides_behind_each_other_are_refused_by_the_verifier_though_their_kinematics_are_known(tmp_path):
+    scene = parsed(write(tmp_path, more=jaws("prismatic", 1, 0.0), extra=IGNORED))
+    check_scene(scene)
+    behind = tuple(replace(joint, parent="arm/grip_link") if joint.name == "arm/other" else joint for joint in scene.joints)
+    with pytest.raises(ProofError, match="move together"):
+        check_scene(replace(scene, joints=behind))
+
+
+@pytest.mark.parametrize(("factor", "offset"), [(1, 0.0), (-1, 0.07)])
+def test_two_fingers_that_slide_are_one_factor_of_degree_1(tmp_path, factor, offset):
+    path = write(tmp_path, more=jaws("prismatic", factor, offset))
+    scene, rng = parsed(path), np.random.default_rng(0)
+    check_scene(scene)
+    fingers = "arm/grip_link", "arm/other_link"
+    assert Pair(*(f"{body}/pad" for body in fingers)) in scene.pairs
+    assert Kinematics.of(scene).chain(*fingers) == ExactKinematics.by_joint(scene).positions(*fingers) == [1]
+    ((index, terms),) = ExactKinematics.by_joint(scene).factors(*fingers)
+    assert index == 1
+    assert all(x == 0 for row in terms[2] for x in row)
+    drake = Original(path, {"arm/other": ("arm/grip", factor, offset)})
+    for q in rng.uniform(scene.q_lower, scene.q_upper, (20, 2)):
+        drake.place(scene, q)
+        expected = np.linalg.inv(drake.pose(fingers[0])) @ drake.pose(fingers[1])
+        s = exact(scene.to_s(q)[1])
+        of_factor = [
+            [float(Fraction(str(t0 + s * t1))) for t0, t1 in zip(*rows, strict=True)] for rows in zip(terms[0], terms[1], strict=True)
+        ]
+        for found in (our_pose(scene, q, *fingers), exact_pose(scene, q, *fingers), of_factor):
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13)
+    assert Kinematics.of(scene).frames(*fingers) == list(fingers)
 
 
 def test_states_of_makers_count_where_their_joints_are_together(tmp_path):
@@ -334,10 +378,13 @@ directives:
 
 
 def gripper(tmp_path: Path, at: float) -> tuple[Path, Scene]:
-    """A hand that slides, with fingers that open to both sides, and a post beside the second finger, which follows."""
+    """A hand that turns, with fingers that open to both sides, and a post beside the second finger, which follows.
+
+    The fingers overlap where grip is less than -0.01.
+    """
     pad = '<link name="{0}"><collision name="pad"><geometry><box size="0.02 0.02 0.1"/></geometry></collision></link>'
     joint = """<joint name="{0}" type="prismatic"><parent link="hand"/><child link="{0}_link"/><origin xyz="0 {1} 0.15"/>
-      <axis xyz="0 {2} 0"/><limit lower="0" upper="0.1" effort="1" velocity="1"/>{3}</joint>"""
+      <axis xyz="0 {2} 0"/><limit lower="-0.02" upper="0.1" effort="1" velocity="1"/>{3}</joint>"""
     fingers = pad.format("grip_link") + pad.format("other_link")
     fingers += joint.format("grip", 0.02, 1, "") + joint.format("other", -0.02, -1, mimic("grip", 1.0))
     arm = f"""<robot name="arm"><link name="base"/><joint name="turn" type="revolute"><parent link="base"/><child link="hand"/>
@@ -345,12 +392,11 @@ def gripper(tmp_path: Path, at: float) -> tuple[Path, Scene]:
       <link name="hand"><collision name="palm"><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>{fingers}</robot>"""
     room = f"""<sdf version="1.7"><model name="room"><link name="walls"><collision name="post"><pose>0 {at} 0.15 0 0 0</pose>
       <geometry><box><size>0.02 0.02 0.1</size></box></geometry></collision></link></model></sdf>"""
-    ignored = "ignore: [{pair: [arm/grip_link, arm/other_link], reason: they grasp}, {pair: [arm/hand, room/walls], reason: r}]\n"
-    path = write(tmp_path, GRIPPER, arm=arm, files={"room.sdf": room}, extra=ignored)
+    path = write(tmp_path, GRIPPER, arm=arm, files={"room.sdf": room}, extra="ignore: [{pair: [arm/hand, room/walls], reason: r}]\n")
     return path, parsed(path)
 
 
-def test_a_motion_is_proved_to_where_the_finger_that_follows_meets_the_post(tmp_path):
+def test_a_motion_is_proved_to_where_a_finger_meets_the_post_or_the_other_finger(tmp_path):
     """The pad's outside is at y = -0.03 - grip, and the post begins at -0.08."""
     path, scene = gripper(tmp_path, -0.09)
     drake = Original(path, {"arm/other": ("arm/grip", 1, 0.0)})
@@ -360,6 +406,10 @@ def test_a_motion_is_proved_to_where_the_finger_that_follows_meets_the_post(tmp_
         assert (verdict.outcome is Outcome.CERTIFIED) is proved
         drake.place(scene, motion.controls[-1])
         assert bool(drake.touching(scene)) is not proved
+    closing = certify(scene, Motion(Space.Q, np.array([[0.0, 0.01], [0.0, -0.02]])))
+    assert closing.stop.pair == scene.pairs[0]
+    assert 0.01 - 0.03 * closing.stop.time == pytest.approx(-0.01, abs=1e-3)
+    assert closing.statement.end < 2 / 3
     assert verdict.stop is not None
     assert 0.06 * verdict.stop.time == pytest.approx(0.05, abs=1e-3)
     assert "  'arm/other' moves with 'arm/grip'" in certify(scene, Motion(Space.Q, np.array([[0.0, 0.0], [0.0, 0.03]]))).statement.lines()
@@ -386,10 +436,10 @@ def test_bodies_that_a_follower_joins_are_neighbours_that_are_not_covered(tmp_pa
 
 
 def test_a_region_whose_fingers_move_is_free_and_the_post_is_found(tmp_path):
-    """The second finger comes to y = -0.02 - 0.1; a post at -0.09 is on its way, which Drake finds, and at which regions end."""
+    """The second finger comes to y = -0.02 - 0.1, and a post at -0.09 is on its way. The fingers meet. There regions end, says Drake."""
     path, scene = gripper(tmp_path, -0.09)
     drake, post = Original(path, {"arm/other": ("arm/grip", 1, 0.0)}), Pair("arm/other_link/pad", "room/walls/post")
-    assert post in scene.pairs
+    assert scene.pairs == (Pair("arm/grip_link/pad", "arm/other_link/pad"), Pair("arm/grip_link/pad", "room/walls/post"), post)
     everywhere = scene.polytope(np.zeros((0, 2)), np.zeros(0))
 
     def hits(polytope: Polytope, count: int) -> int:
@@ -403,6 +453,9 @@ def test_a_region_whose_fingers_move_is_free_and_the_post_is_found(tmp_path):
     grown = Polytope(np.array(region.manifest["halfspace_normals"]), np.array(region.manifest["halfspace_offsets"]))
     assert hits(grown, 10_000) == 0
     assert hits(everywhere, 1000) > 50
-    assert not grown.contains(scene.to_s(np.array([0.0, 0.09])))
+    for q, pair in (([0.0, 0.07], post), ([0.0, -0.015], scene.pairs[0])):
+        assert not grown.contains(scene.to_s(np.array(q)))
+        drake.place(scene, np.array(q))
+        assert drake.touching(scene) == {pair}
     lines = verify_region(region.proof).lines()
     assert "  'arm/other' moves with 'arm/grip'" in lines
