@@ -85,7 +85,7 @@ def with_followers(leaders: Sequence[Joint], every: Sequence[Joint], followers: 
 def check_ways(scene: Scene) -> None:
     """Refuses joints that move together and are on one way: from the world to a body, and between the bodies of a pair.
 
-    Slides between the bodies of a pair are taken as one, if no other joint that moves is between them.
+    Slides between the bodies of a pair count once, if no other joint that moves is between them.
 
     Raises:
         SceneError: ``unsupported_joint``.
@@ -117,7 +117,7 @@ def said_of(followers: Mapping[str, Mimic], scene: Scene) -> list[str]:
 
 
 def _group(couplings: Sequence[Coupling]) -> list[Coupling]:
-    """Returns the first of the couplings and all that hang together with it."""
+    """Returns the first of the couplings and all that are connected with it."""
     names = {*couplings[0].factors}
     while len(grown := names.union(*(c.factors for c in couplings if names & {*c.factors}))) > len(names):
         names = grown
