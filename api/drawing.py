@@ -54,6 +54,7 @@ def model(scene_id: str, scene: Scene) -> SceneModel:
                 index=joint.index,
                 lower=joint.lower,
                 upper=joint.upper,
+                follows=joint.follows,
             )
             for joint in scene.joints
         ],

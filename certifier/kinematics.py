@@ -65,6 +65,10 @@ class Kinematics:
         up_a, up_b, common = self.ancestors(a), self.ancestors(b), self.common(a, b)
         return up_a[: up_a.index(common) + 1] + up_b[: up_b.index(common)][::-1]
 
+    def frames(self, a: str, b: str) -> list[str]:
+        """Returns the bodies on the path from a to b, both included, but those between two joints that move together."""
+        return [body for body in self.bodies_between(a, b) if not {*self.chain(body, a)} & {*self.chain(body, b)}]
+
     def rigid_root(self, body: str) -> str:
         """Returns the first body on the way up, ``body`` included, that a joint moves relative to its parent, or else the world."""
         while body != WORLD and self.scene.joint_above[body].index is None:
@@ -72,19 +76,33 @@ class Kinematics:
         return body
 
     def path(self, frame: str, body: str) -> list[Factor]:
-        """Returns the factors of X_FB from frame body F to body B, in path order."""
+        """Returns the factors of X_FB from frame body F to body B, in path order.
+
+        Slides that move together are one factor where no other joint is between them: along both, a body moves straight.
+        """
         if (frame, body) in self._paths:
             return self._paths[frame, body]
-        bodies = self.bodies_between(frame, body)
-        factors = []
-        for here, there in itertools.pairwise(bodies):
-            inverse = self.scene.joint_above.get(here) is not None and self.scene.joint_above[here].parent == there
-            factors.append(_factor(self.scene.joint_above[here if inverse else there], self.scene.q_star, inverse))
+        factors: list[Factor] = []
+        slide: int | None = None  # where the last joint that moves is among the factors, if it slides
+        for joint, upwards in self.joints(frame, body):
+            factors.append(_factor(joint, self.scene.q_star, upwards))
+            if slide is not None and joint.index is not None and joint.index == factors[slide].index:
+                factors[slide:] = [_as_one(factors[slide:])]
+            elif joint.index is not None:
+                slide = len(factors) - 1 if joint.kind is JointKind.PRISMATIC else None
         self._paths[frame, body] = factors
         return factors
 
+    def joints(self, frame: str, body: str) -> list[tuple[Joint, bool]]:
+        """Returns the joints from F to B, in path order, each with whether it is crossed upwards, from child to parent."""
+        above, found = self.scene.joint_above, []
+        for here, there in itertools.pairwise(self.bodies_between(frame, body)):
+            upwards = here in above and above[here].parent == there
+            found.append((above[here if upwards else there], upwards))
+        return found
+
     def chain(self, frame: str, body: str) -> list[int]:
-        """Returns the position indices of the joints between F and B, in path order."""
+        """Returns the position indices of the factors between F and B, in path order."""
         return [f.index for f in self.path(frame, body) if f.index is not None]
 
     def numerators(self, frame: str, body: str, s: Array) -> Array:
@@ -143,6 +161,15 @@ def _homogeneous(R: Array, p: Array, scale: float) -> Array:
     X = np.zeros((4, 4))
     X[:3, :3], X[:3, 3], X[3, 3] = R, p, scale
     return X
+
+
+def _as_one(factors: list[Factor]) -> Factor:
+    """Returns the product of a slide, welds and a slide of the same position: (A0 + A1 s) W (B0 + B1 s), in which A1 W B1 is 0."""
+    W = np.eye(4)
+    for weld in factors[1:-1]:
+        W = W @ weld.terms[0]
+    A, B = factors[0].terms, factors[-1].terms
+    return Factor(factors[0].index, np.array([A[0] @ W @ B[0], A[1] @ W @ B[0] + A[0] @ W @ B[1], np.zeros((4, 4))]))
 
 
 def _factor(joint: Joint, q_star: Array, inverse: bool) -> Factor:

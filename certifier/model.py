@@ -56,6 +56,7 @@ class Joint:
         upper: upper limit of q in radians or metres; None for a weld.
         own_limits: the limits of the joint itself, in radians, where those above are a window that is narrower, because s stands for less
             than a whole turn; None on a side without one. None where the limits above are its own.
+        follows: the joint has the position of another one, whose index, kind and limits these are. In the axis is which way it moves.
     """
 
     name: str
@@ -69,6 +70,7 @@ class Joint:
     lower: float | None = None
     upper: float | None = None
     own_limits: tuple[float | None, float | None] | None = None
+    follows: bool = False
 
     @property
     def unit(self) -> Literal["rad", "m"]:
@@ -171,8 +173,13 @@ class Scene(ConfigurationSpace):
 
     @cached_property
     def moving(self) -> tuple[Joint, ...]:
-        """Returns the n joints that have a position, in position order."""
-        return tuple(sorted((j for j in self.joints if j.index is not None), key=lambda j: j.index or 0))
+        """Returns the n joints that have a position of their own, in position order."""
+        return tuple(sorted((j for j in self.joints if j.index is not None and not j.follows), key=lambda j: j.index or 0))
+
+    @cached_property
+    def following(self) -> tuple[Joint, ...]:
+        """Returns the joints that move with another one."""
+        return tuple(j for j in self.joints if j.follows)
 
     @cached_property
     def q_lower(self) -> Array:
@@ -344,6 +351,8 @@ def _plain(part: Joint | Geometry) -> dict[str, Any]:
     plain = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in vars(part).items()}
     if limits := plain.pop("own_limits", None):  # Scenes without windows keep the hash that they had before there were any.
         plain["own_limits"] = list(limits)
+    if not plain.get("follows"):  # So do scenes without joints that follow others.
+        plain.pop("follows", None)
     return plain
 
 
@@ -379,7 +388,7 @@ def _read(document: Any) -> Scene:
 
 
 def _configurations(node: Node, joints: Node) -> Configurations:
-    moving = tuple(joint["name"] for joint in joints.value if joint["index"] is not None)
+    moving = tuple(joint["name"] for joint in joints.value if joint["index"] is not None and not joint.get("follows"))
     found = {}
     for name, positions in node.members().items():
         if not is_configuration_name(name):
@@ -389,7 +398,8 @@ def _configurations(node: Node, joints: Node) -> Configurations:
 
 
 def _joint(node: Node) -> Joint:
-    joint = node.fields("name", "kind", "parent", "child", "axis", "X_PF", "X_BM", "index", "lower", "upper", optional=("own_limits",))
+    needed = ("name", "kind", "parent", "child", "axis", "X_PF", "X_BM", "index", "lower", "upper")
+    joint = node.fields(*needed, optional=("own_limits", "follows"))
     kind = joint["kind"].text()
     if kind not in set(JointKind):
         joint["kind"].refuse("a kind of joint: " + ", ".join(JointKind))
@@ -405,7 +415,14 @@ def _joint(node: Node) -> Joint:
         lower=None if joint["lower"].value is None else joint["lower"].number(),
         upper=None if joint["upper"].value is None else joint["upper"].number(),
         own_limits=_own_limits(joint["own_limits"]) if "own_limits" in joint else None,
+        follows="follows" in joint and _true(joint["follows"]),
     )
+
+
+def _true(node: Node) -> bool:
+    if node.value is not True:
+        node.refuse("true")
+    return True
 
 
 def _own_limits(node: Node) -> tuple[float | None, float | None]:

@@ -31,6 +31,7 @@ class DrawnJoint(BaseModel):
     index: int | None = Field(description="Place in q; null for a weld.")
     lower: float | None = Field(description="Lower limit, radians or metres; null for a weld.")
     upper: float | None = Field(description="Upper limit, radians or metres; null for a weld.")
+    follows: bool = Field(default=False, description="Whether its place in q, and its limits, are those of a joint that it moves with.")
 
 
 class DrawnGeometry(BaseModel):

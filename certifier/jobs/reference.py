@@ -31,7 +31,7 @@ from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee, Outcome, Stage
 from certifier.pair.result import PairResult
 from certifier.polytopes.polytope import chebyshev_center
-from certifier.scene.drake_model import build_diagram, geometry_name, scene_name
+from certifier.scene.drake_model import build_diagram, check_independent, geometry_name, scene_name
 
 
 class Solver(StrEnum):
@@ -99,7 +99,7 @@ class Reference:
 
     Raises:
         CirisError: ``solver_unavailable``.
-        SceneError: ``unsupported_shape`` or ``unsupported_padding``.
+        SceneError: ``unsupported_shape``, ``unsupported_padding`` or ``unsupported_joint``.
     """
 
     def __init__(self, scene: Scene, solver: str = Solver.CLARABEL) -> None:
@@ -109,6 +109,7 @@ class Reference:
         self.scene, self._solver, self._answers = scene, solver, _SOLVERS[Solver(solver)]
         if any(map(scene.padding_of, scene.pairs)):
             raise SceneError("unsupported_padding", "Drake's programs have no padding", field="padding", hint="set it to 0")
+        check_independent(scene)
         start = time.process_time()
         self._diagram = diagram = build_diagram(scene)
         inspector = diagram.scene_graph().model_inspector()

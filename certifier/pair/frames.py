@@ -80,6 +80,8 @@ class Frame:
 def frames_to_try(kinematics: Kinematics, volumes: tuple[Volume, Volume]) -> list[Frame]:
     """Returns the frames to try for two volumes, one after the other until one has a plane."""
     moving, resting = choose_frame(kinematics, volumes), _resting(kinematics, *(volume.body for volume in volumes))
+    if {*resting.chain_a} & {*resting.chain_b}:
+        return [moving]
     if moving.memory(volumes) <= max(AFFORDABLE, 2 * resting.memory(volumes)):
         return [moving]
     return [resting, moving] if moving.memory(volumes) <= LARGEST else [resting]
@@ -100,7 +102,7 @@ def _cheapest(kinematics: Kinematics, a: str, b: str, vertices_a: int, vertices_
         sides = ((vertices_a, len(frame.chain_a)), (vertices_b, len(frame.chain_b)))
         return sum(vertices * dimension(k, k, kinematics.scene.n - k) ** 2 for vertices, k in sides)
 
-    return min((_frame(kinematics, body, a, b) for body in kinematics.bodies_between(a, b)), key=cost)
+    return min((_frame(kinematics, body, a, b) for body in kinematics.frames(a, b)), key=cost)
 
 
 @lru_cache(maxsize=4096)

@@ -27,15 +27,15 @@ def choose_frame(kinematics: Kinematics, volumes: tuple[Volume, Volume], lower: 
     a, b = volumes
     # Slides are sampled as if they turned, too: which frame a proof has depends on these configurations.
     s = np.tan(np.random.default_rng(0).uniform(np.arctan(lower), np.arctan(upper), size=(CONFIGURATIONS, len(lower))))
-    joints = {joint.index: joint for joint in kinematics.scene.moving}
-    reach = {(j, volume.body): _reach(kinematics, joints[j], volume, s) for j in kinematics.chain(a.body, b.body) for volume in volumes}
+    joints = [joint for joint, _ in kinematics.joints(a.body, b.body) if joint.index is not None]
+    reach = {(joint.index, volume.body): _reach(kinematics, joint, volume, s) for joint in joints for volume in volumes}
 
     def cost(frame: str) -> tuple[int, float]:
         chains = [(volume.body, kinematics.chain(frame, volume.body)) for volume in volumes]
         longest = max(len(chain) for _, chain in chains)
         return max(longest - MOST_JOINTS, 0), sum(reach[j, body] for body, chain in chains for j in chain)
 
-    return min(kinematics.bodies_between(a.body, b.body), key=cost), sorted(kinematics.chain(a.body, b.body))
+    return min(kinematics.frames(a.body, b.body), key=cost), sorted(kinematics.chain(a.body, b.body))
 
 
 def _reach(kinematics: Kinematics, joint: Joint, volume: Volume, s: Array) -> float:

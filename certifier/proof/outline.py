@@ -260,13 +260,14 @@ def _outline(scene: Scene, arrays: dict[str, np.ndarray], i: int, header: dict[s
 def _joints_in_play(scene: Scene, frame: str, bodies: Iterable[str]) -> tuple[int, ...]:
     """Returns the position indices of the joints between the frame and any of the bodies, ascending."""
     here = _to_the_world(scene, frame)
-    return tuple(sorted(set().union(*(here ^ _to_the_world(scene, body) for body in {*bodies}))))
+    between = set().union(*(here ^ _to_the_world(scene, body) for body in {*bodies}))
+    return tuple(sorted({index for _, index in between}))
 
 
-def _to_the_world(scene: Scene, body: str) -> set[int]:
-    """Returns the position indices of the joints between a body and the world."""
-    found, joint = set(), scene.joint_above.get(body)
+def _to_the_world(scene: Scene, body: str) -> set[tuple[str, int]]:
+    """Returns the names and the position indices of the joints that move between a body and the world."""
+    found, joint = set[tuple[str, int]](), scene.joint_above.get(body)
     while joint is not None:
-        found |= set() if joint.index is None else {joint.index}
+        found |= set() if joint.index is None else {(joint.name, joint.index)}
         joint = scene.joint_above.get(joint.parent)
     return found

@@ -10,6 +10,7 @@ from certifier.model import Scene
 from certifier.names import escaped
 from certifier.scene.formats.srdf import State
 from certifier.scene.joints import EXACT, by_full_name
+from certifier.scene.mimics import Mimic
 from certifier.scene.semantics import Semantics
 
 Given = Mapping[str, float] | tuple[float, ...]
@@ -39,7 +40,7 @@ def own_configurations(scene: Scene, given: Mapping[str, Given]) -> dict[str, di
 
 
 def srdf_configurations(
-    scene: Scene, semantics: Sequence[Semantics], held: Mapping[str, float]
+    scene: Scene, semantics: Sequence[Semantics], held: Mapping[str, float], followers: Mapping[str, Mimic]
 ) -> tuple[dict[str, dict[str, float]], list[str]]:
     """Returns the configurations that SRDF files name, as ``model/group/state``, and warnings about states that are left out.
 
@@ -47,13 +48,14 @@ def srdf_configurations(
 
     Args:
         held: the positions of joints that are held, by their full names.
+        followers: the joints that move with another one, by their full names.
     """
     found: dict[str, dict[str, float]] = {}
     warnings = []
     for one in semantics:
         for state in one.srdf.states:
             name = "/".join(part for part in (one.model, state.group, state.name) if part)
-            positions, wrong = _of_state(scene, one.model, state, held)
+            positions, wrong = _of_state(scene, one.model, state, held, followers)
             if not wrong and not is_configuration_name(name):
                 wrong = "its name is not accepted: names have no commas, and letters, digits and a few signs of ASCII"
             if not wrong and not positions:
@@ -65,7 +67,9 @@ def srdf_configurations(
     return found, warnings
 
 
-def _of_state(scene: Scene, model: str, state: State, held: Mapping[str, float]) -> tuple[dict[str, float], str | None]:
+def _of_state(
+    scene: Scene, model: str, state: State, held: Mapping[str, float], followers: Mapping[str, Mimic]
+) -> tuple[dict[str, float], str | None]:
     """Returns the positions of the joints of a state that can move, by their full names, and what is wrong with the state."""
     moving, every = {joint.name for joint in scene.moving}, [joint.name for joint in scene.joints]
     positions = {}
@@ -80,7 +84,21 @@ def _of_state(scene: Scene, model: str, state: State, held: Mapping[str, float])
         elif name not in every:
             near = close_matches(name, every)
             return {}, f"{escaped(name)[:200]} is no joint of the scene{f' ({near})' if near else ''}"
-    return positions, None
+    return positions, _of_followers(scene, {f"{model}/{joint}": value for joint, value in state.positions.items()}, positions, followers)
+
+
+def _of_followers(scene: Scene, given: Mapping[str, float], positions: dict[str, float], followers: Mapping[str, Mimic]) -> str | None:
+    """Adds the positions of leaders of which a state names followers alone, and returns what is wrong with a follower's position."""
+    for name, mimic in followers.items():
+        if name in given:
+            meant = (given[name] - mimic.offset) / mimic.factor
+            if mimic.leader not in positions:
+                if wrong := _outside(scene, mimic.leader, meant):
+                    return f"{name} is at {given[name]:.9g}, so {wrong}"
+                positions[mimic.leader] = meant
+            elif abs(positions[mimic.leader] - meant) > EXACT:
+                return f"joint {name} is at {given[name]:.9g}, and {mimic.leader}, which it follows, at {positions[mimic.leader]:.9g}"
+    return None
 
 
 def _outside(scene: Scene, name: str, value: float) -> str | None:

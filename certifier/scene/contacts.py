@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+import numpy as np
 from pydrake.geometry import QueryObject
 
 from certifier.model import Array, Pair, Scene
-from certifier.scene.drake_model import build_diagram, geometry_name
+from certifier.scene.drake_model import build_diagram, geometry_name, in_drake
 
 
 def touching(scene: Scene, configurations: Iterable[Array]) -> Iterator[set[Pair]]:
@@ -35,8 +36,9 @@ def _queries(scene: Scene, configurations: Iterable[Array]) -> Iterator[QueryObj
     context = diagram.CreateDefaultContext()
     plant, scene_graph = diagram.plant(), diagram.scene_graph()
     plant_context = plant.GetMyContextFromRoot(context)
+    own = in_drake(scene, plant)
     for q in configurations:
-        plant.SetPositions(plant_context, q)
+        plant.SetPositions(plant_context, np.asarray(q)[own])
         yield scene_graph.get_query_output_port().Eval(scene_graph.GetMyContextFromRoot(context))
 
 

@@ -305,8 +305,11 @@ def _fix(held: Mapping[str, Any]) -> list[str]:
     followers = {mimic.follower for mimic in mimics} - {*held["unread"]}
     rest = at_rest(mimics, {joint["name"]: (joint["lower"], joint["upper"]) for joint in held["joints"]})
     lines = [f"  {quoted(joint)}: {position:.12g}" for joint, position in rest.items() if joint not in followers]
-    said = "# Other joints mimic these, so they are held, and the others with them. Choose where, or write swept for all positions at once."
-    return [said, "fix:", *lines] if lines else []
+    said = [
+        "# Other joints mimic these, so they are held, and the others with them. Choose where, or write swept for all positions at once.",
+        "# Take a line out, and the joint moves and takes the others with it, if docs/scenes.md allows it; q_star needs a number for it.",
+    ]
+    return [*said, "fix:", *lines] if lines else []
 
 
 @contextmanager

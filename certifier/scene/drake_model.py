@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.geometry import Capsule, CollisionFilterDeclaration, Convex, GeometryId, GeometrySet, SceneGraphInspector, Shape, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
@@ -17,6 +18,8 @@ _INSTANCE = "scene"
 
 def build_diagram(scene: Scene) -> RobotDiagram:
     """Returns the scene as a Drake diagram, with the same joint positions in the same order. Only ``scene.pairs`` can collide in it.
+
+    Joints that follow others have positions of their own in it (:func:`in_drake`).
 
     The geometries are the scene's conv(vertices) + ball(radius), without padding. So a configuration is free when the signed distance of
     every pair is more than twice its padding. Drake's names of bodies, joints and geometries are :func:`drake_name`, and
@@ -36,8 +39,9 @@ def build_diagram(scene: Scene) -> RobotDiagram:
         _add_joint(plant, joint, bodies)
     ids = {g.name: _add_geometry(plant, g, bodies) for g in scene.geometries}
     plant.Finalize()
-    for joint in scene.moving:
-        if plant.GetJointByName(drake_name(joint.name)).position_start() != joint.index:
+    starts = [plant.GetJointByName(drake_name(joint.name)).position_start() for joint in scene.moving]
+    for joint, start, before in zip(scene.moving, starts, [-1, *starts], strict=False):
+        if start < before:
             message = f"joint {joint.name} is not number {joint.index} in a depth-first walk of the tree"
             raise SceneError("joint_order", message, hint="Drake numbers joints so; load the scene from its file again")
     only = CollisionFilterDeclaration().ExcludeWithin(GeometrySet(list(ids.values())))
@@ -45,6 +49,23 @@ def build_diagram(scene: Scene) -> RobotDiagram:
         only.AllowBetween(GeometrySet(ids[pair.a]), GeometrySet(ids[pair.b]))
     scene_graph.collision_filter_manager().Apply(only)
     return builder.Build()
+
+
+def in_drake(scene: Scene, plant: MultibodyPlant) -> NDArray[np.int64]:
+    """Returns which of the scene's positions each of Drake's is, (N,): Drake's positions at q, (n,), are q[in_drake(scene, plant)]."""
+    starts = {plant.GetJointByName(drake_name(joint.name)).position_start(): joint.index for joint in (*scene.moving, *scene.following)}
+    return np.array([starts[i] for i in range(plant.num_positions())], dtype=np.int64)
+
+
+def check_independent(scene: Scene) -> None:
+    """Refuses a scene for methods of Drake's in which all joints are independent.
+
+    Raises:
+        SceneError: ``unsupported_joint``.
+    """
+    if scene.following:
+        message = f"joint {scene.following[0].name} follows another one, and Drake's methods for regions have independent joints only"
+        raise SceneError("unsupported_joint", message, hint="choose another method, or hold or sweep the joints by fix")
 
 
 def drake_name(name: str) -> str:

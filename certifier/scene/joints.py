@@ -51,11 +51,13 @@ def held_at(
 ) -> dict[str, float]:
     """Returns where joints are held, radians or metres, by their full names. A joint that is coupled to held ones alone is held as well.
 
+    Joints that are coupled to none that is held or swept are left out.
+
     Args:
         swept: full names of joints that are swept.
 
     Raises:
-        SceneError: ``unknown_name``; ``scene_field`` where a joint cannot be there; ``unsupported_joint`` where coupled joints are free.
+        SceneError: ``unknown_name``; ``scene_field`` where a joint cannot be there.
     """
     by_name = {j.name: j for j in joints if j.index is not None}
     at = by_full_name(positions, by_name, "fix")
@@ -184,13 +186,7 @@ def _check_within(joint: Joint, value: float) -> None:
 def _follow(at: dict[str, float], by_name: Mapping[str, Joint], couplings: Sequence[Coupling]) -> None:
     """Adds to the positions of held joints those of joints that are coupled to held ones alone."""
     waiting = list(couplings)
-    while waiting:
-        known = next((c for c in waiting if sum(name not in at for name in c.factors) <= 1), None)
-        if known is None:
-            names = " and ".join(waiting[0].factors)
-            first = next(iter(waiting[0].factors))
-            hint = f"hold one of them, as in fix: {{{first}: 0}}, or sweep it, as in fix: {{{first}: swept}}; the other follows"
-            raise SceneError("unsupported_joint", f"joints {names} are coupled (mimic), and none is held", field="directives", hint=hint)
+    while known := next((c for c in waiting if sum(name not in at for name in c.factors) <= 1), None):
         waiting.remove(known)
         rest = known.constant - sum(factor * at[name] for name, factor in known.factors.items() if name in at)
         follower = next((name for name in known.factors if name not in at), None)
@@ -203,8 +199,8 @@ def _follow(at: dict[str, float], by_name: Mapping[str, Joint], couplings: Seque
             raise SceneError("scene_field", message, field="fix", hint="hold one of them; the other follows")
 
 
-def _welded(joint: Joint, value: float) -> Joint:
-    """Returns the weld that holds a joint at a position."""
+def motion(joint: Joint, value: float) -> Array:
+    """Returns X_FM of a joint at a position, (4, 4)."""
     X_FM = np.eye(4)
     if joint.kind is JointKind.REVOLUTE:
         x, y, z = joint.axis
@@ -212,4 +208,9 @@ def _welded(joint: Joint, value: float) -> Joint:
         X_FM[:3, :3] += np.sin(value) * cross + (1 - np.cos(value)) * cross @ cross
     else:
         X_FM[:3, 3] = value * joint.axis
-    return Joint(joint.name, JointKind.WELD, joint.parent, joint.child, np.zeros(3), joint.X_PF @ X_FM, joint.X_BM)
+    return X_FM
+
+
+def _welded(joint: Joint, value: float) -> Joint:
+    """Returns the weld that holds a joint at a position."""
+    return Joint(joint.name, JointKind.WELD, joint.parent, joint.child, np.zeros(3), joint.X_PF @ motion(joint, value), joint.X_BM)

@@ -46,7 +46,7 @@ from certifier.errors import SceneError
 from certifier.model import Array, Geometry, Joint, JointKind, Scene
 from certifier.names import MAX_SENTENCE, escaped
 from certifier.positions import MAGNITUDE
-from certifier.scene import shapes
+from certifier.scene import following, shapes
 from certifier.scene.census import check_counts
 from certifier.scene.configurations import own_configurations, srdf_configurations
 from certifier.scene.copies import Copies
@@ -104,9 +104,10 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     sweeps = sweeps_of(every, scene_file.swept, scene_file.limits, coupled)
     at = held_at(every, scene_file.fix, coupled, sweeps)
     welded = at | {name: sweep.middle for name, sweep in sweeps.items()}
+    followers = following.followers_of(every, coupled, welded)
     limits = others_of(scene_file.limits, sweeps, every)
-    joints, q_star = centered(narrowed(held(every, welded), limits), scene_file.q_star)
-    tree = Tree(joints, list(names.bodies))
+    leaders, q_star = centered(narrowed(held(following.leading(every, followers), welded), limits), scene_file.q_star)
+    tree = Tree(following.with_followers(leaders, every, followers), list(names.bodies))
     reached, faults = dict[str, float](), dict[str, str]()
     sweeper = Sweeper(tree, sweeps, scene_file.max_vertices)
     read = _geometries(scene_file, strict, copies, plant, inspector, tree, sweeper, names, reached, faults)
@@ -140,12 +141,21 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
             ),
         },
     )
+    following.check_ways(scene)
     check_counts(written, inspector.NumGeometriesWithRole(Role.kProximity), scene)
     drawn = {names.body(plant.GetBodyFromFrameId(inspector.GetFrameId(i))) for i in inspector.GetAllGeometryIds(Role.kIllustration)}
-    states, left_out = srdf_configurations(scene, semantics, at)
+    states, left_out = srdf_configurations(scene, semantics, at, followers)
     files = {entry.reason: one.file for one in semantics for entry in one.ignore}
     document = replace(scene, configurations=states | own_configurations(scene, scene_file.configurations)).to_document()
-    document["warnings"] = warnings + said_of(sweeps) + unused + without + left_out + findings(scene, tree, candidates, drawn, files)
+    document["warnings"] = (
+        warnings
+        + said_of(sweeps)
+        + following.said_of(followers, scene)
+        + unused
+        + without
+        + left_out
+        + findings(scene, tree, candidates, drawn, files)
+    )
     return document
 
 

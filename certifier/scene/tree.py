@@ -99,4 +99,4 @@ def turned(j: Joint) -> Joint:
     if j.kind is JointKind.WELD:
         X = np.linalg.inv(j.X_PF @ np.linalg.inv(j.X_BM))
         return Joint(j.name, j.kind, j.child, j.parent, j.axis, X, np.eye(4))
-    return Joint(j.name, j.kind, j.child, j.parent, -j.axis, j.X_BM, j.X_PF, j.index, j.lower, j.upper, j.own_limits)
+    return Joint(j.name, j.kind, j.child, j.parent, -j.axis, j.X_BM, j.X_PF, j.index, j.lower, j.upper, j.own_limits, j.follows)

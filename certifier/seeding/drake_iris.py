@@ -31,7 +31,7 @@ from certifier.errors import RegionError
 from certifier.model import Array, Joint, JointKind, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.proved import needed_faces
-from certifier.scene.drake_model import build_diagram, drake_name
+from certifier.scene.drake_model import build_diagram, check_independent, drake_name
 from certifier.seeding.options import Method, SeedOptions
 
 _START_RADIUS = 1e-2
@@ -117,6 +117,7 @@ class _Iris:
 
 def checker(scene: Scene) -> SceneGraphCollisionChecker:
     """Returns Drake's collision checker of a scene, with its padding; its distance is the length in q."""
+    check_independent(scene)
     diagram = build_diagram(_apart(scene))
     robot = diagram.plant().GetJointByName(drake_name(scene.moving[0].name)).model_instance()
     checker = SceneGraphCollisionChecker(

@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from flint import arb, ctx, fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpq_poly
 
+from certifier.errors import ProofError
 from certifier.model import WORLD, Array, Joint, JointKind, Scene
 
 Matrix = list[list[fmpq_mpoly]]
@@ -70,12 +71,26 @@ class ExactKinematics:
         return cls(scene, [fmpq_poly([0, 1])] * scene.n, lambda x: fmpq_poly([x]))
 
     def path(self, frame: str, body: str) -> list[tuple[Joint, bool]]:
-        """Returns the joints from the frame's body to the body, each with whether it is crossed upwards, from child to parent."""
+        """Returns the joints from the frame's body to the body, each with whether it is crossed upwards, from child to parent.
+
+        Raises:
+            ProofError: two of the joints have the same position, and are not slides without another joint that moves between them. What is
+                computed here would hold, but not what is made of it: that a polynomial has at most the degree 2 in a position. Such slides
+                together are affine in it.
+        """
         up, down = self._to_world(frame), self._to_world(body)
         while up and down and up[-1] is down[-1]:
             up.pop()
             down.pop()
+        moving = [joint for joint in (*up, *reversed(down)) if joint.index is not None]
+        parts = sum(not _slide_together(before, joint) for before, joint in zip([None, *moving], moving, strict=False))
+        if len({joint.index for joint in moving}) < parts:
+            raise ProofError("proof_model", f"two joints between {frame} and {body} move together, which no proof of a pair may use")
         return [(joint, True) for joint in up] + [(joint, False) for joint in reversed(down)]
+
+    def positions(self, frame: str, body: str) -> list[int]:
+        """Returns the position indices of the joints between two bodies, ascending, each of them once."""
+        return sorted({joint.index for joint, _ in self.path(frame, body) if joint.index is not None})
 
     def _to_world(self, body: str) -> list[Joint]:
         joints: list[Joint] = []
@@ -101,7 +116,7 @@ class ExactKinematics:
         return self._embedded(fixed) if X is None else _multiply(X, fixed)
 
     def factors(self, frame: str, body: str) -> list[tuple[int | None, list[Numbers]]]:
-        """Returns X_FB times its denominator as a product, in path order, with one factor T0 + T1 s_i + T2 s_i^2 for each joint that moves.
+        """Returns X_FB times its denominator as a product, in path order, with one factor T0 + T1 s_i + T2 s_i^2 for each position.
 
         A factor is the joint's position index i and its terms, each (4, 4). Welds are part of the factors, whose denominators, the
         entries [3][3], are 1 + s_i^2 or 1. Where no joint moves there is one constant factor, whose index is None.
@@ -112,7 +127,10 @@ class ExactKinematics:
             outer, middle, inner = self._joint(joint, upwards)
             fixed = _multiply(fixed, outer)
             if middle is not None:
-                found.append((joint.index, _multiply(fixed, middle)))
+                moved = _multiply(fixed, middle)
+                if found and found[-1][0] == joint.index:
+                    moved = _multiply(found.pop()[1], moved)
+                found.append((joint.index, moved))
                 fixed = _identity()
             fixed = _multiply(fixed, inner)
         if found:
@@ -200,6 +218,10 @@ class ExactKinematics:
         none = self._embed(zero)
         rows = [[(norm if i == j else none) + skew[i][j] * first + square[i][j] * second for j in range(3)] + [none] for i in range(3)]
         return [*rows, [none, none, none, norm]]
+
+
+def _slide_together(first: Joint | None, second: Joint) -> bool:
+    return first is not None and first.index == second.index and first.kind is second.kind is JointKind.PRISMATIC
 
 
 def _identity() -> Numbers:

@@ -27,7 +27,7 @@ from certifier.proof.motion import Motion, MotionProof
 from certifier.verify.chains import UP, poses
 from certifier.verify.decimals import exactly, rounded_down
 from certifier.verify.pieces import Pieces
-from certifier.verify.scene import check_scene
+from certifier.verify.scene import check_scene, following
 from certifier.verify.sides import Known, Sides
 from certifier.verify.uncovered import not_covered
 
@@ -68,6 +68,7 @@ class MotionStatement:
         return [
             f"a motion {what}:",
             f"  joints {names}, all {points} within their limits",
+            *following(scene),
             f"  from {motion.space.value} = {start}",
             f"  to {motion.space.value} = {end}",
             f"  SHA-256 of the {points} as doubles: {digest}",

@@ -99,7 +99,7 @@ class CellCheck:
 
     def __init__(self, scene: Scene, ground: Ground, box: Box, lower: Array, upper: Array, proof: PartitionProof) -> None:
         kinematics = ExactKinematics.by_joint(scene)
-        chains = [[joint.index for joint, _ in kinematics.path(proof.frame, v.body) if joint.index is not None] for v in proof.all_volumes]
+        chains = [kinematics.positions(proof.frame, volume.body) for volume in proof.all_volumes]
         self._play = sorted(set().union(*chains))
         if max(map(len, chains)) > limits.CHAIN or len(self._play) > limits.PLAY:
             most = f"{limits.CHAIN} between the frame and a body, {limits.PLAY} in all"

@@ -20,7 +20,7 @@ from certifier.verify.decimals import exactly, rounded_down, rounded_up
 from certifier.verify.kinematics import exact
 from certifier.verify.paddings import paddings
 from certifier.verify.pair import check_ground
-from certifier.verify.scene import check_scene
+from certifier.verify.scene import check_scene, following
 from certifier.verify.separations import Progress, statements
 from certifier.verify.uncovered import not_covered
 
@@ -57,6 +57,7 @@ class RegionStatement:
             f"scene of hash {scene.hash}",
             f"{scene.n} {'joint' if scene.n == 1 else 'joints'}, within their limits:",
             *joints,
+            *following(scene),
             f"a bounded, non-empty polytope of {self.faces} half-spaces in tangent space; |s|^2 <= {rounded_up(self.N, 6)}",
             f"{len(self.gaps)} pairs of bodies separated at every configuration of it",
             *paddings(scene),

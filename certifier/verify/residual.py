@@ -61,7 +61,7 @@ class Numerators:
         Raises:
             ProofError: more joints lie between them than MAX_CHAIN.
         """
-        chain = tuple(sorted(joint.index for joint, _ in kinematics.path(frame, body) if joint.index is not None))
+        chain = tuple(kinematics.positions(frame, body))
         if len(chain) > MAX_CHAIN:
             raise ProofError("proof_too_large", f"more than {MAX_CHAIN} joints between {frame} and {body}")
         scale = fmpq(2) ** POSITION_BITS / kinematics.scale(frame, body)

@@ -15,6 +15,7 @@ from certifier.errors import ProofError
 from certifier.model import WORLD, Joint, JointKind, Scene
 from certifier.names import escaped, is_name, is_sentence
 from certifier.proof import limits
+from certifier.verify.kinematics import ExactKinematics
 
 RIGID = 1e-9
 """The numbers of a rotation or of an axis may be this far from orthonormal; those of a parsed model are within about 1e-16."""
@@ -32,6 +33,13 @@ def check_scene(scene: Scene) -> None:
     for joint in scene.joints:
         _check_joint(scene, joint)
     _check_bodies(scene)
+    if scene.following:
+        _check_no_position_twice(scene)
+
+
+def following(scene: Scene) -> list[str]:
+    """Returns a line for each joint that follows another one."""
+    return [f"  '{joint.name}' moves with '{scene.moving[joint.index or 0].name}'" for joint in scene.following]
 
 
 def _require(condition: Any, problem: str) -> None:
@@ -83,9 +91,26 @@ def _check_tree(scene: Scene) -> None:
             _require(above[path[-1]] == WORLD or above[path[-1]] in above, f"the parent of {path[-1]} is no body")
             path.append(above[path[-1]])
     _require(scene.q_star.size, "no joint of it moves")
-    positions = [joint.index for joint in scene.joints if joint.index is not None]
+    positions = [joint.index for joint in scene.joints if joint.index is not None and not joint.follows]
     _require(scene.q_star.shape == (len(positions),) and (np.abs(scene.q_star) <= limits.MAGNITUDE).all(), "q*")
     _require(all(type(i) is int for i in positions) and sorted(positions) == list(range(scene.n)), "the joints' positions")
+    for joint in scene.following:
+        _require(type(joint.index) is int and 0 <= joint.index < scene.n, f"the position of {joint.name}")
+        leader = scene.moving[joint.index or 0]
+        same = all(getattr(joint, what) == getattr(leader, what) for what in ("kind", "lower", "upper", "own_limits"))
+        _require(same, f"{joint.name}, which follows a joint of another kind or with other limits")
+
+
+def _check_no_position_twice(scene: Scene) -> None:
+    """Refuses two joints of one position between the world and a body. Between the geometries of a pair there may be two slides, and no
+    other joint between them: ExactKinematics.path says why.
+    """
+    kinematics, body = ExactKinematics.by_joint(scene), {geometry.name: geometry.body for geometry in scene.geometries}
+    for name in scene.bodies:
+        moving = [joint.index for joint, _ in kinematics.path(WORLD, name) if joint.index is not None]
+        _require(len({*moving}) == len(moving), f"two joints between {WORLD} and {name} move together")
+    for one, other in sorted({(body[pair.a], body[pair.b]) for pair in scene.pairs}):
+        kinematics.path(one, other)
 
 
 def _check_joint(scene: Scene, joint: Joint) -> None:

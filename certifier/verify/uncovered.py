@@ -121,7 +121,8 @@ class _Geometries:
 
     def neighbours(self) -> list[tuple[str, str, int]]:
         """Returns those of the missing ones whose bodies a joint joins."""
-        return list(self._missing(sorted((joint.parent, joint.child)) for joint in self._scene.moving))
+        joined = (joint for joint in self._scene.joints if joint.index is not None)
+        return list(self._missing(sorted((joint.parent, joint.child)) for joint in joined))
 
     def missing_altogether(self) -> int:
         """Returns how many pairs are missing."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from certifier.jobs.reference import Reference
 from certifier.scene import load_scene
 from certifier.scene.draft import draft
 from tests.certifier.scene.workshop import SCENE
@@ -13,6 +14,11 @@ D = "directives: [{add_model: {name: a, file: a.urdf}}]\n"
 WELD = "{{add_weld: {{parent: world, child: a::l, X_PC: {{{}}}}}}}"
 MIMIC = '<joint name="follow" type="revolute"><parent link="hand"/><child link="tip"/><axis xyz="0 0 1"/><mimic joint="turn"/>'
 MIMIC += '<limit lower="-1" upper="2" effort="1" velocity="1"/></joint><link name="tip"/>'
+BESIDE = MIMIC.replace('"hand"', '"base"').replace(
+    '<link name="tip"/>', '<link name="tip"><collision name="pad"><geometry><sphere radius="0.01"/></geometry></collision></link>'
+)
+"""A body that turns beside the hand, and with it."""
+APART = "ignore: [{pair: [arm/hand, arm/tip], reason: r}]"
 TIP = MIMIC.replace('<mimic joint="turn"/>', "")
 FREE = SCENE.replace("  - add_weld: {parent: world, child: room::walls}\n", "")
 SDF_SHAPE = """<sdf version="1.7"><model name="room"><link name="walls"><collision name="wall"><geometry>{}</geometry></collision></link>
@@ -160,6 +166,7 @@ SCENES: Table = {
     ("no_joints", "directives"): [lambda t: t.scene(extra="fix: {turn: 0}")],
     ("scene_field", "q_star"): [lambda t: t.scene(extra="q_star: [0, 0]")],
     ("joint_range", "directives"): [
+        lambda t: t.scene(more=MIMIC.replace("<mimic ", '<mimic offset="9" ')),
         lambda t: t.scene(limit='<limit lower="1" upper="1" effort="1" velocity="1"/>'),
         lambda t: t.scene(**mjcf("<joint name='j' type='slide'/><geom size='0.1'/>")),
     ],
@@ -177,7 +184,13 @@ SCENES: Table = {
     ],
     ("unknown_name", "fix.turm"): [lambda t: t.scene(extra="fix: {turm: 0}")],
     ("unknown_name", "fix.zzz"): [lambda t: t.scene(extra="fix: {zzz: 0}")],
-    ("unsupported_joint", "directives"): [lambda t: t.scene(more=MIMIC)],
+    ("unsupported_joint", "directives"): [
+        lambda t: t.scene(more=MIMIC),
+        lambda t: t.scene(more=MIMIC.replace("<mimic ", '<mimic multiplier="2" ')),
+        lambda t: t.scene(more=MIMIC.replace("revolute", "prismatic")),
+        lambda t: t.scene(more=BESIDE),
+    ],
+    ("unsupported_joint", ""): [lambda t: Reference(t.scene(more=BESIDE, extra=APART))],
     ("scene_field", "fix"): [
         lambda t: t.scene(more=MIMIC, extra="fix: {turn: 0, follow: 1}"),
         lambda t: t.scene(more=MIMIC, extra="fix: {turn: swept, follow: swept}"),

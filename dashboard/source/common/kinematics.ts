@@ -96,9 +96,9 @@ export function shortNames(names: string[]): string[] {
   return models.size > 1 ? names : names.map((name) => name.slice(name.lastIndexOf("/") + 1));
 }
 
-/** The names of the joints that have a position, in position order. */
+/** The names of the joints that have a position of their own, in position order. */
 export function positions(model: SceneModel): string[] {
-  const moving = model.joints.filter((joint) => joint.index !== null);
+  const moving = model.joints.filter((joint) => joint.index !== null && !joint.follows);
   return moving.sort((a, b) => a.index! - b.index!).map((joint) => joint.name);
 }
 

@@ -1,0 +1,189 @@
+"""Joints that follow another one move with it here: both have the same position, and the follower's axis and frame say how it moves.
+
+A follower is at ``factor`` times the position of its leader, plus ``offset``. With a factor of -1, its axis points the other way. The
+offset becomes a part of its fixed frame X_PF. The limits of the leader become those at which all followers are within theirs.
+
+With another factor, s = tan((q - q*)/2) of a follower that turns is no rational function of low degree in that of its leader. So such
+joints are held or swept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from certifier.errors import SceneError
+from certifier.kinematics import Kinematics
+from certifier.model import WORLD, Joint, JointKind, Scene
+from certifier.scene.joints import Coupling, motion, range_of
+from certifier.scene.mimics import Mimic, mimic_of
+
+
+def followers_of(joints: Sequence[Joint], couplings: Sequence[Coupling], still: Collection[str]) -> dict[str, Mimic]:
+    """Returns the joints that follow one that moves, by their full names. Their leaders follow none.
+
+    Args:
+        still: full names of the joints that are held or swept.
+
+    Raises:
+        SceneError: ``unsupported_joint``, where joints are coupled in a way in which they cannot move.
+    """
+    by_name = {joint.name: joint for joint in joints if joint.index is not None}
+    waiting = [coupling for coupling in couplings if not {*coupling.factors} <= {*still}]
+    found: dict[str, Mimic] = {}
+    while waiting:
+        group = _group(waiting)
+        waiting = [coupling for coupling in waiting if coupling not in group]
+        leader = _leader(group, list(by_name))
+        lines = {leader: (1.0, 0.0)}
+        while len(lines) < 1 + len(group):
+            known = next((c for c in group if len({*c.factors} & {*lines}) == len(c.factors) - 1 == 1), None)
+            if known is None:
+                raise _refused(leader, [*dict.fromkeys(name for c in group for name in c.factors)], "by other equations than mimic joints")
+            (of_it, factor), (other, own) = sorted(known.factors.items(), key=lambda item: item[0] not in lines)
+            of_leader, offset = lines[of_it]
+            lines[other] = -factor * of_leader / own, (known.constant - factor * offset) / own
+        for name, (factor, offset) in lines.items():
+            if name != leader:
+                found[name] = Mimic(name, leader, factor, offset)
+    for mimic in found.values():
+        _check(by_name[mimic.follower], by_name[mimic.leader], mimic)
+    return found
+
+
+def leading(joints: Sequence[Joint], followers: Mapping[str, Mimic]) -> list[Joint]:
+    """Returns the joints without those that follow. The limits of leaders are those at which all their followers are within theirs.
+
+    Raises:
+        SceneError: ``joint_range`` for a leader that has no such range.
+    """
+    by_name = {joint.name: joint for joint in joints}
+    found = {joint.name: joint for joint in joints if joint.name not in followers}
+    for mimic in followers.values():
+        leader = found[mimic.leader]
+        lower, upper = _within(mimic, *range_of(by_name[mimic.follower]))
+        lower, upper = (max(range_of(leader)[0], lower), min(range_of(leader)[1], upper))
+        if lower >= upper:
+            message = f"joint {mimic.follower} follows {mimic.leader}, and there is no range of positions with both within their limits"
+            hint = f"mend the limits in the model, or hold the joints, as in fix: {{{mimic.leader}: 0}}"
+            raise SceneError("joint_range", message, field="directives", hint=hint)
+        found[mimic.leader] = replace(leader, lower=lower, upper=upper)
+    return list(found.values())
+
+
+def with_followers(leaders: Sequence[Joint], every: Sequence[Joint], followers: Mapping[str, Mimic]) -> list[Joint]:
+    """Returns the joints in the order of ``every``: the leaders, and each follower with the position and the limits of its leader."""
+    found = {joint.name: joint for joint in leaders}
+    return [
+        _following(joint, found[followers[joint.name].leader], followers[joint.name]) if joint.name in followers else found[joint.name]
+        for joint in every
+    ]
+
+
+def check_ways(scene: Scene) -> None:
+    """Refuses joints that move together and are on one way: from the world to a body, and between the bodies of a pair.
+
+    Slides between the bodies of a pair count once, if no other joint that moves is between them.
+
+    Raises:
+        SceneError: ``unsupported_joint``.
+    """
+    if not scene.following:
+        return
+    for body in scene.bodies:
+        if twice := _twice(_moving(scene, WORLD, body)):
+            message = f"joints {' and '.join(twice)} move together, and one is behind the other, which is not supported"
+            raise SceneError("unsupported_joint", message, field="directives", hint=_still(twice[0]))
+    for pair in scene.pairs:
+        bodies = [scene.geometry(name).body for name in (pair.a, pair.b)]
+        if twice := _twice(_slides_as_one(_moving(scene, bodies[0], bodies[1]))):
+            message = f"joints {' and '.join(twice)} move together, and both are between {pair.a} and {pair.b}, which is not supported"
+            ignored = f"ignore: [{{pair: [{', '.join(bodies)}], reason: REASON}}]"
+            hint = f"{_still(twice[0])}; or certify nothing about these bodies, by {ignored}"
+            raise SceneError("unsupported_joint", message, field="directives", hint=hint)
+
+
+def said_of(followers: Mapping[str, Mimic], scene: Scene) -> list[str]:
+    """Returns sentences for people about the joints that follow."""
+    found = []
+    for joint in scene.moving:
+        behind = [name for name, mimic in followers.items() if mimic.leader == joint.name]
+        if behind:
+            ends = f"{joint.lower:.9g} to {joint.upper:.9g} {joint.unit}"
+            found.append(f"joint {joint.name} takes {', '.join(behind)} with it: one coordinate, from {ends}, moves them all")
+    return found
+
+
+def _group(couplings: Sequence[Coupling]) -> list[Coupling]:
+    """Returns the first of the couplings and all that are connected with it."""
+    names = {*couplings[0].factors}
+    while len(grown := names.union(*(c.factors for c in couplings if names & {*c.factors}))) > len(names):
+        names = grown
+    return [c for c in couplings if names & {*c.factors}]
+
+
+def _leader(group: Sequence[Coupling], order: Sequence[str]) -> str:
+    """Returns the joint that others follow and that follows none. With a factor of -1 it is not known which of two that is."""
+    names = sorted({name for coupling in group for name in coupling.factors}, key=order.index)
+    known = [mimic for mimic in map(mimic_of, group) if mimic is not None and mimic.factor != -1]
+    leaders, followers = {mimic.leader for mimic in known}, {mimic.follower for mimic in known}
+    free = [name for name in names if name not in followers]
+    return max(free or names, key=lambda name: (name in leaders, sum(name in coupling.factors for coupling in group)))
+
+
+def _check(follower: Joint, leader: Joint, mimic: Mimic) -> None:
+    names = [leader.name, follower.name]
+    if follower.kind is not leader.kind:
+        raise _refused(leader.name, names, "though one slides and the other turns")
+    if abs(mimic.factor) != 1:
+        raise _refused(leader.name, names, f"with the multiplier {mimic.factor:.9g}")
+
+
+def _refused(leader: str, names: Sequence[str], how: str) -> SceneError:
+    message = f"joints {' and '.join(names)} are coupled (mimic) {how}; such joints cannot move in ciris, only with a multiplier of 1 or -1"
+    return SceneError("unsupported_joint", message, field="directives", hint=f"{_still(leader)}; the others follow")
+
+
+def _still(joint: str) -> str:
+    return f"hold one of them, as in fix: {{{joint}: 0}}, or sweep it, as in fix: {{{joint}: swept}}"
+
+
+def _within(mimic: Mimic, lower: float, upper: float) -> tuple[float, float]:
+    """Returns the leader's positions at which the follower is within its limits, rounded inwards."""
+    first, last = sorted(mimic.factor * (limit - mimic.offset) for limit in (lower, upper))
+    if mimic.offset == 0:
+        return first, last
+    inwards = (float(np.nextafter(end, to)) if np.isfinite(end) else end for end, to in ((first, np.inf), (last, -np.inf)))
+    return next(inwards), next(inwards)
+
+
+def _following(joint: Joint, leader: Joint, mimic: Mimic) -> Joint:
+    X_PF = joint.X_PF @ motion(joint, mimic.offset) if mimic.offset else joint.X_PF
+    own = leader.index, leader.lower, leader.upper, leader.own_limits
+    return Joint(joint.name, joint.kind, joint.parent, joint.child, mimic.factor * joint.axis + 0.0, X_PF, joint.X_BM, *own, follows=True)
+
+
+def _moving(scene: Scene, one: str, other: str) -> list[Joint]:
+    """Returns the joints that move between two bodies, in path order."""
+    return [joint for joint, _ in Kinematics.of(scene).joints(one, other) if joint.index is not None]
+
+
+def _slides_as_one(joints: Sequence[Joint]) -> list[Joint]:
+    """Returns the joints without slides that come right after one with the same position."""
+    return [
+        joint
+        for before, joint in zip((None, *joints), joints, strict=False)
+        if before is None or before.index != joint.index or joint.kind is not JointKind.PRISMATIC
+    ]
+
+
+def _twice(joints: Sequence[Joint]) -> tuple[str, str] | None:
+    """Returns two joints with the same position."""
+    seen: dict[int | None, str] = {}
+    for joint in joints:
+        if joint.index in seen:
+            return seen[joint.index], joint.name
+        seen[joint.index] = joint.name
+    return None
