@@ -154,8 +154,18 @@ class _Memory:
         account = Account(self.certified, self.seeding_seconds, spent, self.seconds)
         self.tell("step", {"kind": "accept", "state": "running", "seconds": None})
         proofs = self.proofs(self.candidate)
-        made_of = (self.scene, self.state, self.candidate, proofs, account, self.proposal, self.former)
-        region = make_region(*made_of, self.processes, self._tell_verified, self.last)
+        region = make_region(
+            self.scene,
+            self.state,
+            self.candidate,
+            proofs,
+            account,
+            self.proposal,
+            self.former,
+            self.processes,
+            self._tell_verified,
+            self.last,
+        )
         taken = self.seconds - begun
         self.tell("step", {"kind": "accept", "state": "done", "seconds": taken})
         self.tell("region", {"iteration": self.candidate.iteration, "ellipsoid_volume": self.candidate.ellipsoid_volume, **region.summary})

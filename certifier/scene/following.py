@@ -16,7 +16,7 @@ import numpy as np
 
 from certifier.errors import SceneError
 from certifier.kinematics import Kinematics
-from certifier.model import WORLD, Joint, JointKind, Scene
+from certifier.model import WORLD, Joint, Scene
 from certifier.scene.joints import Coupling, motion, range_of
 from certifier.scene.mimics import Mimic, mimic_of
 
@@ -98,7 +98,9 @@ def check_ways(scene: Scene) -> None:
             raise SceneError("unsupported_joint", message, field="directives", hint=_still(twice[0]))
     for pair in scene.pairs:
         bodies = [scene.geometry(name).body for name in (pair.a, pair.b)]
-        if twice := _twice(_slides_as_one(_moving(scene, bodies[0], bodies[1]))):
+        chain = Kinematics.of(scene).chain(bodies[0], bodies[1])
+        repeated = {index for index in chain if chain.count(index) > 1}
+        if twice := _twice([joint for joint in _moving(scene, bodies[0], bodies[1]) if joint.index in repeated]):
             message = f"joints {' and '.join(twice)} move together, and both are between {pair.a} and {pair.b}, which is not supported"
             ignored = f"ignore: [{{pair: [{', '.join(bodies)}], reason: REASON}}]"
             hint = f"{_still(twice[0])}; or certify nothing about these bodies, by {ignored}"
@@ -168,15 +170,6 @@ def _following(joint: Joint, leader: Joint, mimic: Mimic) -> Joint:
 def _moving(scene: Scene, one: str, other: str) -> list[Joint]:
     """Returns the joints that move between two bodies, in path order."""
     return [joint for joint, _ in Kinematics.of(scene).joints(one, other) if joint.index is not None]
-
-
-def _slides_as_one(joints: Sequence[Joint]) -> list[Joint]:
-    """Returns the joints without slides that come right after one with the same position."""
-    return [
-        joint
-        for before, joint in zip((None, *joints), joints, strict=False)
-        if before is None or before.index != joint.index or joint.kind is not JointKind.PRISMATIC
-    ]
 
 
 def _twice(joints: Sequence[Joint]) -> tuple[str, str] | None:

@@ -207,7 +207,9 @@ def test_a_motion_is_proved_to_where_a_finger_meets_the_post_or_the_other_finger
 
 
 def test_a_region_whose_fingers_move_is_free_and_the_post_is_found(tmp_path):
-    """The second finger comes to y = -0.02 - 0.1, and a post at -0.09 is on its way. The fingers meet. There regions end, says Drake."""
+    """One finger reaches y = -0.12, and a post stands at y = -0.09. The fingers can also touch each other. Drake finds no contact in the
+    region, and finds both contacts outside of it.
+    """
     path, scene = gripper(tmp_path, -0.09)
     drake, post = Original(path, {"arm/other": ("arm/grip", 1, 0.0)}), Pair("arm/other_link/pad", "room/walls/post")
     assert scene.pairs == (Pair("arm/grip_link/pad", "arm/other_link/pad"), Pair("arm/grip_link/pad", "room/walls/post"), post)

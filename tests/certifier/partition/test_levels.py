@@ -218,14 +218,13 @@ def test_points_are_named_where_a_ball_touches_that_saves_joints_so_that_faces_p
 
 
 def parted(scene, polytope, index, faces=True):
-    certification = CellCertification(scene, polytope)
-    return Search(
-        certification._area, certification._shared, certification._volumes(index), keep_of(certification) if faces else None
-    ).parted
+    return search_of(CellCertification(scene, polytope), index, faces).parted
 
 
-def keep_of(certification):
-    return certification._area.center[None]
+def search_of(certification, index, faces):
+    """The search of a pair; with ``faces`` it knows a point that stays inside."""
+    area = certification._area
+    return Search(area, certification._shared, certification._volumes(index), area.center[None] if faces else None)
 
 
 def test_faces_part_coarse_volumes_only_where_they_are_added_and_save_two_joints_of_seven():
@@ -259,10 +258,7 @@ def test_wide_cells_are_cut_for_the_volumes_that_faces_part_and_not_for_the_bodi
     certification = CellCertification(scene, polytope)
     cuts = {}
     for faces in (False, True):
-        looking, root = (
-            Search(certification._area, certification._shared, certification._volumes(index), keep_of(certification) if faces else None),
-            Node(),
-        )
+        looking, root = search_of(certification, index, faces), Node()
         looking.run([OpenCell(root, certification._area.lower, certification._area.upper)], CELLS)
         cuts[faces] = {node.kind for node in root.preorder() if node.children}
     assert cuts[True] <= {0, 1, 2, 3}

@@ -3,14 +3,9 @@
 import numpy as np
 import pytest
 
-from certifier.partition.area import Area
-from certifier.partition.bodies import Bodies
-from certifier.partition.frames import choose_frame
-from certifier.partition.scouts import scouted, with_others
-from certifier.partition.together import volumes_of
 from certifier.polytopes.cutting import samples_of
 from certifier.seeding.contacts import Contacts
-from certifier.seeding.corners import without_contacts
+from certifier.seeding.corners import _found, without_contacts
 from certifier.seeding.drake_iris import checker
 from tests.certifier.scenes import box, cube, planar_arm
 
@@ -25,11 +20,7 @@ def beside(y):
 
 
 def looked_for(scene, polytope, seed):
-    area, volumes = Area.of(scene, polytope, seed), volumes_of(scene, [scene.pairs[TIP]])
-    frame, joints = choose_frame(area.kinematics, volumes, area.lower, area.upper)
-    bodies = Bodies(area, frame, volumes)
-    found = scouted(area, bodies, seed)
-    return np.array(with_others(area, bodies, joints, found)).reshape(-1, scene.n)
+    return np.array([s for _, _, contacts in _found(scene, polytope, {TIP: (TIP,)}, seed) for s in contacts]).reshape(-1, scene.n)
 
 
 @pytest.mark.parametrize("y", [3.4, 3.8, 4.4])
