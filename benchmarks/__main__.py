@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
@@ -144,7 +145,7 @@ def _parser() -> ArgumentParser:
     covered.add_argument(
         "--way", action="append", choices=[cover.CIRIS, cover.DRAKE], help="drake: IRIS regions without certificates; default ciris"
     )
-    covered.add_argument("--deadline", type=float, metavar="SECONDS", help="default: the case's")
+    covered.add_argument("--deadline", type=_seconds, metavar="SECONDS", help="default: the case's")
     covered.add_argument("--processes", type=_count, default=2, metavar="N", help="number of solving processes; default 2")
     covered.add_argument("--data", type=Path, metavar="DIR", help="keep the service's data in this new directory; default: remove it")
     covered.add_argument("--verify", action="store_true", help="have the service check the proof of every region once more")
@@ -177,12 +178,12 @@ def _parser() -> ArgumentParser:
         "robots", nargs="*", metavar="ROBOT", default=list(models.ROBOTS), help=f"default: all; {', '.join(models.ROBOTS)}"
     )
     shipped.add_argument(
-        "--deadline", type=float, default=robots.DEADLINE, metavar="SECONDS", help=f"for each region; default {robots.DEADLINE:g}"
+        "--deadline", type=_seconds, default=robots.DEADLINE, metavar="SECONDS", help=f"for each region; default {robots.DEADLINE:g}"
     )
     held = kinds.add_parser("arms", parents=[as_json], help="take makers' arms with their hands from installed wheels to planned motions")
     held.add_argument("arms", nargs="*", metavar="ARM", default=list(makers.ARMS), help=f"default: all; {', '.join(makers.ARMS)}")
     held.add_argument(
-        "--deadline", type=float, default=makers.DEADLINE, metavar="SECONDS", help=f"for each region; default {makers.DEADLINE:g}"
+        "--deadline", type=_seconds, default=makers.DEADLINE, metavar="SECONDS", help=f"for each region; default {makers.DEADLINE:g}"
     )
     held.add_argument("--motions", type=_count, default=makers.MOTIONS, metavar="N", help=f"how many to plan; default {makers.MOTIONS}")
     asked = kinds.add_parser("query", parents=[as_json], help="measure questions of planners about many regions, beside a plain product")
@@ -210,6 +211,17 @@ def _count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise ArgumentTypeError(f"'{text}' is not a whole number of at least 1")
     return int(text)
+
+
+def _seconds(text: str) -> float:
+    """Returns the positive number of seconds that a text stands for."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise ArgumentTypeError(f"'{text}' is not a positive number of seconds")
+    return value
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 
@@ -21,11 +22,14 @@ from certifier.scene.joints import Coupling, motion, range_of
 from certifier.scene.mimics import Mimic, mimic_of
 
 
-def followers_of(joints: Sequence[Joint], couplings: Sequence[Coupling], still: Collection[str]) -> dict[str, Mimic]:
+def followers_of(
+    joints: Sequence[Joint], couplings: Sequence[Coupling], still: Collection[str], marked: Collection[str] = ()
+) -> dict[str, Mimic]:
     """Returns the joints that follow one that moves, by their full names. Their leaders follow none.
 
     Args:
         still: full names of the joints that are held or swept.
+        marked: full names of joints that follow another one by what their model says. Of others, couplings alone tell.
 
     Raises:
         SceneError: ``unsupported_joint``, where joints are coupled in a way in which they cannot move.
@@ -36,7 +40,7 @@ def followers_of(joints: Sequence[Joint], couplings: Sequence[Coupling], still: 
     while waiting:
         group = _group(waiting)
         waiting = [coupling for coupling in waiting if coupling not in group]
-        leader = _leader(group, list(by_name))
+        leader = _leader(group, list(by_name), marked)
         lines = {leader: (1.0, 0.0)}
         while len(lines) < 1 + len(group):
             known = next((c for c in group if len({*c.factors} & {*lines}) == len(c.factors) - 1 == 1), None)
@@ -126,11 +130,11 @@ def _group(couplings: Sequence[Coupling]) -> list[Coupling]:
     return [c for c in couplings if names & {*c.factors}]
 
 
-def _leader(group: Sequence[Coupling], order: Sequence[str]) -> str:
-    """Returns the joint that others follow and that follows none. With a factor of -1 it is not known which of two that is."""
+def _leader(group: Sequence[Coupling], order: Sequence[str], marked: Collection[str]) -> str:
+    """Returns the joint that others follow and that follows none. With a factor of -1, a coupling does not tell which of two that is."""
     names = sorted({name for coupling in group for name in coupling.factors}, key=order.index)
     known = [mimic for mimic in map(mimic_of, group) if mimic is not None and mimic.factor != -1]
-    leaders, followers = {mimic.leader for mimic in known}, {mimic.follower for mimic in known}
+    leaders, followers = {mimic.leader for mimic in known}, {*marked} | {mimic.follower for mimic in known}
     free = [name for name in names if name not in followers]
     return max(free or names, key=lambda name: (name in leaders, sum(name in coupling.factors for coupling in group)))
 
@@ -138,7 +142,10 @@ def _leader(group: Sequence[Coupling], order: Sequence[str]) -> str:
 def _check(follower: Joint, leader: Joint, mimic: Mimic) -> None:
     names = [leader.name, follower.name]
     if follower.kind is not leader.kind:
-        raise _refused(leader.name, names, "though one slides and the other turns")
+        message = (
+            f"joint {follower.name} follows {leader.name} (mimic), but one slides and the other turns; such joints cannot move in ciris"
+        )
+        raise SceneError("unsupported_joint", message, field="directives", hint=f"{_still(leader.name)}; the other follows")
     if abs(mimic.factor) != 1:
         raise _refused(leader.name, names, f"with the multiplier {mimic.factor:.9g}")
 
@@ -154,11 +161,17 @@ def _still(joint: str) -> str:
 
 def _within(mimic: Mimic, lower: float, upper: float) -> tuple[float, float]:
     """Returns the leader's positions at which the follower is within its limits, rounded inwards."""
-    first, last = sorted(mimic.factor * (limit - mimic.offset) for limit in (lower, upper))
-    if mimic.offset == 0:
-        return first, last
-    inwards = (float(np.nextafter(end, to)) if np.isfinite(end) else end for end, to in ((first, np.inf), (last, -np.inf)))
-    return next(inwards), next(inwards)
+    first, last = sorted((mimic.factor * (limit - mimic.offset), limit) for limit in (lower, upper))
+    return _inwards(mimic, *first, np.inf), _inwards(mimic, *last, -np.inf)
+
+
+def _inwards(mimic: Mimic, position: float, limit: float, towards: float) -> float:
+    """Returns the double that is nearest to where a follower is at a limit, on the side of ``towards``."""
+    if not np.isfinite(limit):
+        return position
+    exactly = Fraction(mimic.factor) * (Fraction(limit) - Fraction(mimic.offset))
+    beyond = Fraction(position) < exactly if towards > 0 else Fraction(position) > exactly
+    return float(np.nextafter(position, towards)) if beyond else position
 
 
 def _following(joint: Joint, leader: Joint, mimic: Mimic) -> Joint:

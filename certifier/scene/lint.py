@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from certifier.kinematics import Kinematics
 from certifier.model import Array, Geometry, Pair, Scene
 from certifier.scene.contacts import touching
 from certifier.scene.hollow import beyond, remedy, standing_for
@@ -190,6 +191,8 @@ def _apart(scene: Scene) -> set[tuple[str, ...]]:
     """Returns the bodies with ignored pairs of which none touches at any configuration tried."""
     ignored = tuple(Pair(pair.a, pair.b) for pair in scene.ignored)
     apart = {_bodies(scene, pair.a, pair.b) for pair in ignored}
+    chains = {bodies: Kinematics.of(scene).chain(bodies[0], bodies[-1]) for bodies in apart}
+    apart = {bodies for bodies, chain in chains.items() if len({*chain}) == len(chain)}  # others cannot be certified
     for found in touching(replace(scene, pairs=ignored), _tried(scene, _IGNORED_SAMPLES)):
         apart -= {_bodies(scene, pair.a, pair.b) for pair in found}
         if not apart:

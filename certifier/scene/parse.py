@@ -104,7 +104,8 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     sweeps = sweeps_of(every, scene_file.swept, scene_file.limits, coupled)
     at = held_at(every, scene_file.fix, coupled, sweeps)
     welded = at | {name: sweep.middle for name, sweep in sweeps.items()}
-    followers = following.followers_of(every, coupled, welded)
+    marked = {names.joint(plant.GetJointByName(name, plant.GetModelInstanceByName(model))) for model, name in strict.followers}
+    followers = following.followers_of(every, coupled, welded, marked)
     limits = others_of(scene_file.limits, sweeps, every)
     leaders, q_star = centered(narrowed(held(following.leading(every, followers), welded), limits), scene_file.q_star)
     tree = Tree(following.with_followers(leaders, every, followers), list(names.bodies))

@@ -37,6 +37,7 @@ class StrictReader:
     Attributes:
         working_directory: the directory in which Drake has to read the models. Relative paths of SDFormat's includes start there.
         unlimited: the continuous joints that have limits in a URDF file, where they do not count: Drake's names of model and joint.
+        followers: the joints that mimic another one in a URDF file: Drake's names of model and joint.
     """
 
     def __init__(self, scene_file: SceneFile) -> None:
@@ -44,6 +45,7 @@ class StrictReader:
         self._expander = Expander(self._root, scene_file.packages, scene_file.xacro)
         self._expanded: set[Path] = set()
         self.unlimited: list[tuple[str, str]] = []
+        self.followers: list[tuple[str, str]] = []
         self._meshes: dict[Path, Mesh] = {}
         self._models: dict[tuple[Path, type[ModelFile]], ModelFile] = {}
         self._counts: dict[_Read, int] = {}
@@ -51,10 +53,17 @@ class StrictReader:
 
     @property
     def notes(self) -> list[str]:
-        """One line about the meshes that say that another axis than z is up, if there are any."""
+        """What Drake does not read: that another axis than z of a mesh is up, and SDFormat's <mimic>; one line for each of these."""
         turned = [f"{self.name(path)} ({mesh.up})" for path, mesh in self._meshes.items() if mesh.up]
         more = f" and {len(turned) - 1} more" if len(turned) > 1 else ""
-        return [f"the up_axis of {turned[0]}{more} is not applied, as in RViz and MoveIt; coordinates stay as they stand"] if turned else []
+        found = (
+            [f"the up_axis of {turned[0]}{more} is not applied, as in RViz and MoveIt; coordinates stay as they stand"] if turned else []
+        )
+        places = [f"{model.name}:{line}" for model in self._models.values() if isinstance(model, Sdf) for line in model.mimics]
+        if places:
+            how = "these joints move by themselves, unless fix holds or sweeps them (<drake:mimic> lets them follow)"
+            found.append(f"SDFormat's <mimic> in {', '.join(places[:5])} is not read: {how}")
+        return found
 
     @property
     def working_directory(self) -> Path:
@@ -137,6 +146,7 @@ class StrictReader:
         model = self.model(path, self.kind(path))
         if isinstance(model, Urdf):
             self.unlimited += [("::".join(named), joint.file) for joint in model.unlimited]
+            self.followers += [("::".join(named), name) for name in model.followers]
         return self._counted(model, path, around)
 
     def found(self, added: AddedFile, name: str) -> Path:

@@ -13,7 +13,11 @@ from certifier.scene.formats.ranges import POSITION, SCALE, SIZE
 
 
 class Sdf(ModelFile):
-    """Reads SDFormat, where numbers are the text of elements."""
+    """Reads SDFormat, where numbers are the text of elements.
+
+    Attributes:
+        mimics: the lines of SDFormat's own <mimic>, which Drake does not read.
+    """
 
     _DIMENSIONS: ClassVar[dict[str, dict[str, int]]] = {
         "box": {"size": 3},
@@ -48,6 +52,7 @@ class Sdf(ModelFile):
     UNREAD = frozenset().union(*sdf_names.HARMLESS.values()) - sdf_names.READ
 
     def __init__(self, path: Path, name: str, data: bytes) -> None:
+        self.mimics: list[int] = []
         self._limits: dict[str, float] = {}
         self._uri: FileReference | None = None
         self._scale = 1.0, 1.0, 1.0
@@ -153,6 +158,8 @@ class Sdf(ModelFile):
                 self._check_one_of(element, "type", sdf_names.JOINTS)
                 if "axis2" in element.children and element.attributes["type"].lower() not in self._TWO_AXES:
                     self.refuse(element, "<joint> has an <axis2>, which its type does not have")
+            case "mimic":
+                self.mimics.append(element.line)
             case "drake:mimic":
                 for key in {"multiplier", "offset"} & element.attributes.keys():
                     what = f"{key} of <drake:mimic>"

@@ -40,6 +40,7 @@ class Urdf(ModelFile):
 
     Attributes:
         unlimited: the continuous joints that have limits, which do not count in URDF.
+        followers: the names of the joints that mimic another one.
     """
 
     ONCE = SHAPES | {"origin", "axis", "limit", "geometry", "parent", "child", "mimic"}
@@ -59,6 +60,7 @@ class Urdf(ModelFile):
 
     def __init__(self, path: Path, name: str, data: bytes) -> None:
         self.unlimited: list[Reference] = []
+        self.followers: list[str] = []
         self._opaque = set(OPAQUE)
         """Elements that are not looked into."""
         self._prefixes: list[str] = []
@@ -218,8 +220,11 @@ class Urdf(ModelFile):
         name, limit, axis = child.attributes["link"], self._parts.get("limit"), self._parts.get("axis")
         if (first := self._held.setdefault(name, joint)) is not joint:
             self.refuse(child, f"link {name!a} is the child of another joint too, in line {first.line}", hint="only trees are supported")
-        if kind == "fixed" and "mimic" in self._parts:
-            self._leave_out(self._parts["mimic"])
+        if "mimic" in self._parts:
+            if kind == "fixed":
+                self._leave_out(self._parts["mimic"])
+            else:
+                self.followers.append(joint.attributes["name"])
         if kind in MOVING:
             if axis is not None:
                 self._check_length(axis, "xyz of <axis>", list(map(float, axis.attributes["xyz"].split())))

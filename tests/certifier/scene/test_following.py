@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from flint import fmpq
 
@@ -19,7 +20,7 @@ from certifier.verify.scene import check_scene
 from certifier.verify.uncovered import Why, document
 from tests.certifier.scene.hands import IGNORED, gripper, jaws
 from tests.certifier.scene.test_sweep import knuckles, slides
-from tests.certifier.scene.workshop import LIMIT, parsed, write
+from tests.certifier.scene.workshop import LIMIT, SCENE, parsed, write
 
 WRIST = jaws("prismatic", 1, 0.0).replace(
     '<joint name="grip" type="prismatic"><parent link="hand"/>', '<joint name="grip" type="prismatic"><parent link="w"/>'
@@ -61,6 +62,41 @@ def test_what_cannot_move_together_is_refused_with_what_to_do(tmp_path, more, ex
     assert caught.value.code == code
     assert words in caught.value.message
     assert caught.value.hint
+
+
+@pytest.mark.parametrize("factor", [1, -1])
+def test_the_coordinate_has_the_name_of_the_joint_that_is_followed_wherever_it_stands(tmp_path, factor):
+    first, second = jaws("prismatic", factor, 0.05).split('<joint name="other"')
+    scene = parsed(write(tmp_path, more=f'<joint name="other"{second}{first}', extra=IGNORED))
+    assert [joint.name for joint in scene.moving] == ["arm/turn", "arm/grip"]
+    assert [joint.name for joint in scene.following] == ["arm/other"]
+
+
+@pytest.mark.parametrize(("offset", "own"), [(0.08, (0.0, 0.08)), (0.1, (0.0, 0.3)), (-0.3, (-0.7, 0.0))])
+def test_limits_are_rounded_inwards_where_they_are_no_doubles_and_only_there(tmp_path, offset, own):
+    """A joint is at ``offset`` - grip; the grip is within -1 and 1 itself."""
+    scene = parsed(write(tmp_path, more=jaws("prismatic", -1, offset, (-1, 1), own), extra=IGNORED))
+    for q, limit, outwards in ((scene.q_lower[1], own[1], -1), (scene.q_upper[1], own[0], 1)):
+        exactly = exact(offset) - exact(limit)
+        assert outwards * (exact(q) - exactly) <= 0
+        assert outwards * (exact(float(np.nextafter(q, outwards * np.inf))) - exactly) > 0
+
+
+def test_an_ignored_pair_that_could_not_be_certified_is_not_said_to_be(tmp_path):
+    scene = parsed(write(tmp_path, more=jaws("revolute", 1, 0.0), extra=IGNORED))
+    assert not [warning for warning in scene.warnings if "without the entry" in warning]
+
+
+def test_what_sdformat_says_of_a_mimic_joint_is_named_where_drake_does_not_read_it(tmp_path):
+    joint = """<link name="{0}l"/><joint name="{0}" type="prismatic"><parent>base</parent><child>{0}l</child><axis><xyz>0 1 0</xyz>
+<limit><lower>0</lower><upper>1</upper></limit>{1}</axis></joint>"""
+    mimic = '<mimic joint="a"><multiplier>-1</multiplier></mimic>'
+    hand = f'<sdf version="1.11"><model name="hand"><link name="base"/>{joint.format("a", "")}{joint.format("b", mimic)}</model></sdf>'
+    add = "  - add_model: {name: hand, file: hand.sdf}\n  - add_weld: {parent: world, child: hand::base}\n"
+    scene = parsed(write(tmp_path, SCENE + add, files={"hand.sdf": hand}))
+    (said,) = [warning for warning in scene.warnings if "<mimic>" in warning]
+    assert "hand.sdf:3" in said
+    assert "fix holds or sweeps them" in said
 
 
 @pytest.mark.parametrize("fix", ["fix: {grip: 0.1}\n", "fix: {other: 0.1}\n", "fix: {grip: swept}\n"])
