@@ -97,7 +97,7 @@ ARMS = {
     "dual_fr3": Arm(
         ROBOPLAN, "franka_robot_model/dual_fr3.urdf", "left_fr3_arm/ready,right_fr3_arm/ready", shelf="0.85,0,0", bin="0.45,0,0"
     ),
-    "panda": Arm(GEPETTO, "panda_description/urdf/panda.urdf"),
+    "panda": Arm(GEPETTO, "panda_description/urdf/panda.urdf", "default"),
     "ur10": Arm(GEPETTO, "ur_description/urdf/ur10_robot.urdf", shelf="0.9,0,0", bin="0,0.7,0"),
     "xarm7": Arm(GEPETTO, "xarm_description/urdf/xarm7.urdf"),
     "tiago": Arm(GEPETTO, "tiago_description/robots/tiago_no_hand.urdf", table="0.55,0,0.5", shelf="1.05,0,0.5", bin="0.6,0.45,0.5"),

@@ -111,10 +111,11 @@ def draft(
     found, notes = {name: root for roots, _ in looked for name, root in roots.items()}, [note for _, said in looked for note in said]
     head = _head(out, robot, found, arguments or {}, directory)
     add = {name: f"  - add_model: {{name: {quoted(name)}, file: {quoted(_relative(path, directory))}}}" for name, path in models.items()}
-    held = _inventory("\n".join([head, *add.values()]), models, directory)
     own = [*parts][: 1 + len(mounts)]
+    semantics = srdf or _beside(robot)
+    held = _inventory("\n".join([head, *add.values()]), models, {} if semantics is None else {own[0]: semantics}, directory)
     head = "\n".join([head, *_directives(add, parts, own, held), *_limits(held), *_fix(held)]) + "\n"
-    head, said = _with_srdf(head, srdf, robot, own[0], directory)
+    head, said = _with_srdf(head, semantics, semantics is srdf, robot, own[0], directory)
     notes += said
     scene = _loaded(head, directory)
     if more := hulls(scene) + vertices(scene, SceneFile.max_vertices):
@@ -141,25 +142,28 @@ def _always(scene: Scene, configurations: Iterable[Array]) -> dict[Pair, float]:
     return least
 
 
-def _with_srdf(head: str, given: Path | None, robot: Path, name: str, directory: Path) -> tuple[str, list[str]]:
+def _beside(robot: Path) -> Path | None:
+    """Returns the SRDF file beside a robot's model; None where there is none."""
+    return next(filter(Path.is_file, [robot.with_suffix(".srdf"), robot.parent.parent / "srdf" / f"{robot.stem}.srdf"]), None)
+
+
+def _with_srdf(head: str, file: Path | None, given: bool, robot: Path, name: str, directory: Path) -> tuple[str, list[str]]:
     """Returns the beginning of a scene file with the robot's SRDF file, if there is one, and sentences that say so.
 
-    A file that was not named, and that does not fit to the model, is left out.
+    A file that was not given, and that does not fit to the model, is left out.
     """
-    beside_model = [robot.with_suffix(".srdf"), robot.parent.parent / "srdf" / f"{robot.stem}.srdf"]
-    named = given or next(filter(Path.is_file, beside_model), None)
-    if named is None:
+    if file is None:
         among = sorted(path.name for path in (robot.absolute().parent.parent / "srdf").glob("*.srdf"))
         return head, [f"not used: {', '.join(among)} in ../srdf of the model; name one with --srdf"] if among else []
     text = f"{head}# Pairs that MoveIt does not check, and named configurations:\nsrdf: {{{quoted(name)}: "
-    text += f"{quoted(_relative(named, directory))}}}\n"
+    text += f"{quoted(_relative(file, directory))}}}\n"
     try:
         _loaded(text, directory)
     except SceneError as error:
-        if given is not None or not (error.field or "").startswith("srdf"):
+        if given or not (error.field or "").startswith("srdf"):
             raise
-        return head, [f"not used: {named}, which is beside the model: {error.message}"]
-    return text, [] if given else [f"{named} is beside the model, and the draft uses it"]
+        return head, [f"not used: {file}, which is beside the model: {error.message}"]
+    return text, [] if given else [f"{file} is beside the model, and the draft uses it"]
 
 
 def _free(scene: Scene, middle: Array, random: Array, always: set[Pair]) -> Array | None:
@@ -203,10 +207,13 @@ def _head(out: Path, robot: Path, packages: Mapping[str, Path], arguments: Mappi
     return "\n".join([*lines, "directives:"])
 
 
-def _inventory(text: str, models: Mapping[str, Path], directory: Path) -> dict[str, Any]:
-    """Returns what the models of a scene file hold (:mod:`certifier.scene.inventory`)."""
+def _inventory(text: str, models: Mapping[str, Path], srdf: Mapping[str, Path], directory: Path) -> dict[str, Any]:
+    """Returns what the models of a scene file, and an SRDF file, hold (:mod:`certifier.scene.inventory`)."""
     with _scene_file(text, directory) as path:
-        payload = {"path": str(path), "models": {name: str(beside(Path.cwd(), str(model))) for name, model in models.items()}}
+        files = {
+            key: {name: str(beside(Path.cwd(), str(file))) for name, file in of.items()} for key, of in (("models", models), ("srdf", srdf))
+        }
+        payload = {"path": str(path), **files}
         return read_in_child("certifier.scene.inventory:inventory", payload, "the draft", TIMEOUT_S, MEMORY_BYTES)
 
 
@@ -303,7 +310,7 @@ def _fix(held: Mapping[str, Any]) -> list[str]:
     """Returns where joints are held that others mimic, and where those that Drake does not have follow."""
     mimics = [Mimic(**mimic) for mimic in held["mimics"]]
     followers = {mimic.follower for mimic in mimics} - {*held["unread"]}
-    rest = at_rest(mimics, {joint["name"]: (joint["lower"], joint["upper"]) for joint in held["joints"]})
+    rest = at_rest(mimics, {joint["name"]: (joint["lower"], joint["upper"]) for joint in held["joints"]}, held["state"])
     lines = [f"  {quoted(joint)}: {position:.12g}" for joint, position in rest.items() if joint not in followers]
     said = [
         "# Other joints mimic these, so they are held, and the others with them. Choose where, or write swept for all positions at once.",

@@ -14,9 +14,11 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, RigidBody
 from pydrake.systems.framework import DiagramBuilder
 
+from certifier.errors import SceneError
 from certifier.model import Joint
 from certifier.scene.copies import Copies
 from certifier.scene.file import read_scene_file
+from certifier.scene.formats.srdf import Srdf
 from certifier.scene.mimics import Mimic, mimic_of
 from certifier.scene.names import Names
 from certifier.scene.parse import couplings, joint_of, read_models, without_limits
@@ -31,9 +33,10 @@ def inventory(payload: dict[str, Any]) -> dict[str, Any]:
     ``translation`` in metres and ``rpy`` in degrees. ``joints`` lists those that move: ``name``, ``kind``, ``lower`` and ``upper``.
     ``links`` lists Drake's names of all bodies but the world, and ``leaves`` those that no joint leads on from.
     ``mimics`` lists the fields of each :class:`Mimic`. ``unread`` names the followers of which Drake does not read that they follow.
+    ``state`` has the positions of that state of the SRDF file which names the most joints; none if the file is not accepted.
 
     Args:
-        payload: ``path``, and ``models``, the model files by the names of their models.
+        payload: ``path``; ``models``, the model files by the names of their models; ``srdf``, by the name of its model, if there is one.
 
     Raises:
         SceneError: whatever is wrong with the file or the models that it names.
@@ -59,7 +62,16 @@ def inventory(payload: dict[str, Any]) -> dict[str, Any]:
         "joints": [{"name": j.name, "kind": j.kind.value, "lower": j.lower, "upper": j.upper} for j in joints if j.index is not None],
         "mimics": [vars(mimic) for mimic in (*read, *unread)],
         "unread": [mimic.follower for mimic in unread],
+        "state": {name: value for model, file in payload["srdf"].items() for name, value in _largest_state(model, Path(file)).items()},
     }
+
+
+def _largest_state(model: str, file: Path) -> dict[str, float]:
+    try:
+        states = [state.positions for state in Srdf(file, file.name).states]
+    except SceneError:  # The draft is loaded with this file afterwards, which says what is wrong with it.
+        return {}
+    return {f"{model}/{joint}": value for joint, value in max(states, key=len, default={}).items()}
 
 
 def _bodies(plant: MultibodyPlant) -> list[RigidBody]:

@@ -34,13 +34,14 @@ def mimic_of(coupling: Coupling) -> Mimic | None:
     return Mimic(one, other, -by_other / by_one, coupling.constant / by_one)
 
 
-def at_rest(mimics: Sequence[Mimic], limits: Mapping[str, tuple[float, float]]) -> dict[str, float]:
-    """Returns positions for the joints that lead and for those that follow them, the leaders' as near to 0 as all limits allow.
+def at_rest(mimics: Sequence[Mimic], limits: Mapping[str, tuple[float, float]], wanted: Mapping[str, float]) -> dict[str, float]:
+    """Returns positions for the joints that lead and for those that follow them, the leaders' as near to those wanted as all limits allow.
 
     Joints that follow each other in a circle are left out.
 
     Args:
         limits: by joint, radians or metres.
+        wanted: by joint; 0 for those that are missing.
 
     Raises:
         SceneError: ``scene_model``, where a joint can nowhere be within its limits.
@@ -62,5 +63,5 @@ def at_rest(mimics: Sequence[Mimic], limits: Mapping[str, tuple[float, float]]) 
                 f"other joints that follow within their limits, for {joint} {limits[joint][0]:g} to {limits[joint][1]:g}"
             )
             raise SceneError("scene_model", message, field="directives", hint="mend the limits, the multiplier or the offset in the model")
-    rest = {leader: float(np.clip(0.0, *ends)) for leader, ends in ranges.items()}
+    rest = {leader: float(np.clip(wanted.get(leader, 0.0), *ends)) for leader, ends in ranges.items()}
     return {joint: factor * rest[leader] + offset for joint, (leader, factor, offset) in lines.items()}

@@ -263,6 +263,24 @@ def test_an_srdf_file_beside_the_model_is_used_and_said(tmp_path: Path) -> None:
         cell(tmp_path / "urdf", srdf=tmp_path / "srdf" / "other.srdf")
 
 
+def test_a_joint_that_others_mimic_is_held_where_the_state_of_the_maker_has_it(tmp_path: Path) -> None:
+    """Of two states, the one with more joints says where. A value beyond the limits is as good as the limit."""
+    model = '<robot name="g"><link name="palm"/>{}</robot>'
+    joint = """<joint name="{0}" type="prismatic"><parent link="palm"/><child link="{0}_tip"/><axis xyz="1 0 0"/>{1}
+    <limit lower="0" upper="0.04" effort="1" velocity="1"/></joint><link name="{0}_tip"/>"""
+    (tmp_path / "g.urdf").write_text(model.format(joint.format("l", "") + joint.format("r", '<mimic joint="l"/>') + joint.format("x", "")))
+    state = '<group_state name="{0}" group="all"><joint name="l" value="{1}"/>{2}</group_state>'
+    for value, held in ((0.01, 0.01), (0.1, 0.04)):
+        states = state.format("open", 0.03, "") + state.format("home", value, '<joint name="x" value="0.02"/>')
+        (tmp_path / "g.srdf").write_text(f'<robot name="g">{states}</robot>')
+        made = draft(tmp_path / "g.urdf", [], tmp_path / "scene.yaml", {})
+        assert said(made, "fix") == {"g/l": held}
+    (tmp_path / "g.srdf").write_text("<robot name='g'><nonsense/></robot>")
+    made = draft(tmp_path / "g.urdf", [], tmp_path / "scene.yaml", {})
+    assert said(made, "fix") == {"g/l": 0}
+    assert "not used" in made.notes[0]
+
+
 U = """v -0.2 -0.2 0\nv 0.2 -0.2 0\nv 0.2 0.2 0\nv -0.2 0.2 0\nv -0.2 -0.2 0.2\nv 0.2 -0.2 0.2\nv 0.2 0.2 0.2\nv -0.2 0.2 0.2
 f 1 4 3 2\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"""
 """A box of 0.4 m and 0.2 m in height without a lid."""
