@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 from numba import njit
+from scipy.sparse import csc_array
 
 from certifier.coordinates import ConfigurationSpace
 from certifier.model import Array, Polytope
@@ -20,6 +21,8 @@ _FORGET = 40
 """The chains start from points that are uniform in s, and walk on for this many rounds over all axes first."""
 _THIN = 8
 """Between two samples of a chain lie this many rounds over all axes."""
+LANES = 32
+"""This many chains walk side by side."""
 
 
 def uniform_in_q(polytope: Polytope, space: ConfigurationSpace, chains: int, each: int, seed: int) -> Array:
@@ -47,42 +50,61 @@ def uniform_in_q(polytope: Polytope, space: ConfigurationSpace, chains: int, eac
 
 def _walk(polytope: Polytope, space: ConfigurationSpace, s: Array, rounds: int, rng: np.random.Generator) -> Array:
     """Returns the chains s (k, n) after that many rounds over all axes."""
-    walked = s.copy()
-    _rounds(np.ascontiguousarray(polytope.C.T), polytope.d, space.revolute, rng.random((rounds, s.shape[1], len(s))), walked)
+    columns, places = csc_array(polytope.C), rng.random((rounds, s.shape[1], len(s)))
+    begins, faces = columns.indptr.astype(np.int64), columns.indices.astype(np.int64)
+    walked = np.empty(s.shape)
+    for first in range(0, len(s), LANES):
+        some = slice(first, first + LANES)
+        lanes = np.ascontiguousarray(s[some].T)
+        _rounds(begins, faces, columns.data, polytope.d, space.revolute, np.ascontiguousarray(places[:, :, some]), lanes)
+        walked[some] = lanes.T
     return walked
 
 
 @njit(cache=True)
-def _rounds(columns: Array, d: Array, revolute: np.ndarray, places: Array, s: Array) -> None:
-    """Moves the chains s (k, n) along each axis in turn, to a place in [0, 1) of its interval in q.
+def _rounds(begins: np.ndarray, faces: np.ndarray, entries: Array, d: Array, revolute: np.ndarray, places: Array, s: Array) -> None:
+    """Moves the chains s (n, k) along each axis in turn, to a place in [0, 1) of its interval in q.
+
+    The chains are side by side in vector registers.
 
     Args:
-        columns: (n, m) the transpose of C.
+        begins, faces, entries: the entries of C by columns: those of the axis i are ``begins[i] : begins[i + 1]``, each of a face.
         places: (rounds, n, k).
     """
-    slack = np.empty(len(d))
-    for chain in range(len(s)):
-        for turn in range(len(places)):
-            # The slack is computed anew in every round, so that rounding does not add up.
-            slack[:] = d
-            for i in range(len(columns)):
-                slack -= s[chain, i] * columns[i]
-            for i in range(len(columns)):
-                column, here = columns[i], s[chain, i]
-                least, most = -np.inf, np.inf
-                for j in range(len(d)):
-                    room = max(slack[j], 0.0)
-                    if column[j] > 0.0:
-                        most = min(most, room / column[j])
-                    elif column[j] < 0.0:
-                        least = max(least, room / column[j])
-                least, most, place = here + least, here + most, places[turn, i, chain]
+    n, k = s.shape
+    slack, least, most, moved = np.empty((len(d), k)), np.empty(k), np.empty(k), np.empty(k)
+    for turn in range(len(places)):
+        # The slack is computed anew in every round, so that rounding does not add up.
+        for j in range(len(d)):
+            slack[j] = d[j]
+        for i in range(n):
+            for e in range(begins[i], begins[i + 1]):
+                j, entry = faces[e], entries[e]
+                for c in range(k):
+                    slack[j, c] -= s[i, c] * entry
+        for i in range(n):
+            least[:], most[:] = -np.inf, np.inf
+            for e in range(begins[i], begins[i + 1]):
+                j, entry = faces[e], entries[e]
+                if entry > 0.0:
+                    for c in range(k):
+                        room = (slack[j, c] if slack[j, c] > 0.0 else 0.0) / entry
+                        most[c] = room if room < most[c] else most[c]
+                else:
+                    for c in range(k):
+                        room = (slack[j, c] if slack[j, c] > 0.0 else 0.0) / entry
+                        least[c] = room if room > least[c] else least[c]
+            for c in range(k):
+                low, high, place = s[i, c] + least[c], s[i, c] + most[c], places[turn, i, c]
                 if revolute[i]:
-                    begin, end = math.atan(least), math.atan(most)
+                    begin, end = math.atan(low), math.atan(high)
                     there = math.tan(begin + (end - begin) * place)
                 else:
-                    there = least + (most - least) * place
-                there = min(max(there, least), most)
-                for j in range(len(d)):
-                    slack[j] -= (there - here) * column[j]
-                s[chain, i] = there
+                    there = low + (high - low) * place
+                there = min(max(there, low), high)
+                moved[c] = there - s[i, c]
+                s[i, c] = there
+            for e in range(begins[i], begins[i + 1]):
+                j, entry = faces[e], entries[e]
+                for c in range(k):
+                    slack[j, c] -= moved[c] * entry
