@@ -52,7 +52,7 @@ class Whole:
 
     Attributes:
         reach: the faces of the region before were moved out to this many times their distance from the seed. In the first stage these are
-            the proposal's faces, and reach is at most 1 (certifier.growth.whole).
+            the proposal's faces, and reach is at most 1; 0 stands for a box about the seed (certifier.growth.whole).
         kept: the share of the proposal that the best region kept when this stage began.
         polytope: what the cuts so far keep; faces are added before the joint limits, which are its last 2n rows, and none is dropped.
         mid, half, Y_lower, Y_upper: of the :class:`ProvedBox` that is the root cell of all partitions of this stage.
@@ -62,7 +62,7 @@ class Whole:
         spent: pair index -> how many cells were looked at.
         cuts: pair index -> in how many rounds something was cut off for it; pairs without a cut are left out.
         since, passed: the shares of the time until the deadline that had passed when this stage began, and now; 0 without a deadline.
-        stage: the number of the stage, from 1 on.
+        stage: the number of the stage, from 1 on; 0 for a box about the seed.
         together: pair index -> the other pairs that share its certificate.
     """
 

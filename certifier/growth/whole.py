@@ -7,6 +7,8 @@ spent, all cells that are still open are cut off as well.
 The first region comes from a smaller copy of the proposal about the seed, so there is a certified region early. In every further stage
 the faces of the region move out, as far as the proposal, and what is between is certified in the same way. The faces that were found
 where cells are cheap show where the next faces have to be. This takes a fraction of the cells that the proposal itself would take.
+
+Where the seed is in a narrow place, a box about it comes before all that (certifier.growth.nearby).
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from certifier.growth.actions import Certify, Finish, Outcomes, Transition
+from certifier.growth.nearby import nearby
 from certifier.growth.obstacles import Obstacle, joined
 from certifier.growth.options import MOST_CELLS
 from certifier.growth.pairs import by_joints, joints_between
@@ -28,6 +31,8 @@ from certifier.polytopes.cutting import BARELY, Cut, cut, lost_together, samples
 from certifier.polytopes.proved import ProvedBox
 from certifier.polytopes.pushed import pushed
 
+NEARBY = 0.0
+"""The reach of the stage that certifies a box about a seed in a narrow place."""
 FIRST = 0.7
 """In the first stage the faces of the proposal lie this part of their distance from the seed."""
 FARTHEST, FARTHER, FAR = 1.45, 1.25, 1.2
@@ -71,11 +76,17 @@ EARLY_EFFORT = 24 * SLICE
 
 
 def begin_whole(scene: Scene, state: GrowthState, start: Start) -> Transition:
+    """Asks to certify a box about a seed in a narrow place, or else what :func:`_first_stage` does."""
+    box = nearby(scene, start)
+    return _first_stage(scene, state, start) if box is None else begin_stage(scene, state, NEARBY, box)
+
+
+def _first_stage(scene: Scene, state: GrowthState, start: Start, passed: float = 0.0) -> Transition:
     """Asks to certify a smaller copy of the proposal, or all of it where the copy does not contain all points to keep."""
     copy = _copy(scene, start, FIRST)
     if (start.keep @ copy.C.T < copy.d).all():
-        return begin_stage(scene, state, FIRST, copy)
-    return begin_stage(scene, state, 1.0, _copy(scene, start, 1.0))
+        return begin_stage(scene, state, FIRST, copy, passed=passed)
+    return begin_stage(scene, state, 1.0, _copy(scene, start, 1.0), passed=passed)
 
 
 def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
@@ -83,6 +94,8 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
     whole, best = state.whole, state.best
     assert whole is not None
     assert best is not None
+    if whole.reach == NEARBY:
+        return _first_stage(scene, state, start, whole.passed)
     kept = _kept(scene, start, best.polytope)
     if start.again:
         return Transition(state, Finish(Outcome.CERTIFIED, f"certified; {100 * kept:.3g} % of the region is kept"))
@@ -95,7 +108,7 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
 def begin_stage(scene: Scene, state: GrowthState, reach: float, polytope: Polytope, kept: float = 0.0, passed: float = 0.0) -> Transition:
     """Asks to certify all pairs on a polytope; what was proved in the stage before does not carry over to it."""
     box = ProvedBox.of_program(scene, polytope)
-    stage = 1 if state.whole is None else state.whole.stage + 1
+    stage = 0 if reach == NEARBY else 1 if state.whole is None else state.whole.stage + 1
     grouped = _together(scene, state, polytope)
     begun = Whole(reach, kept, polytope, **vars(box), since=passed, passed=passed, stage=stage, together=grouped)
     return _next(scene, replace(state, whole=begun))
@@ -117,8 +130,8 @@ def _kept(scene: Scene, start: Start, polytope: Polytope) -> float:
 
 
 def keeps_more(scene: Scene, start: Start, polytope: Polytope, other: Polytope) -> bool:
-    """Returns whether a region keeps more of the proposal than another one does, by q-volume."""
-    return _kept(scene, start, polytope) > _kept(scene, start, other)
+    """Returns whether a region keeps more of the proposal than another one does, by q-volume, or that one too little to be seen."""
+    return _kept(scene, start, polytope) > (_kept(scene, start, other) or -1)
 
 
 def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes) -> Transition:
@@ -140,7 +153,7 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
         return _next(scene, replace(state, whole=whole))
     most = {i: _most_loss(state, whole, i, 0 if report.weaknesses[i].joints else HARD) for i in failing}
     corners = [corner for i in failing for corner in _corners(scene, i, report.weaknesses[i], most[i])]
-    around = start.rows if whole.reach >= 1 else _copy(scene, start, whole.reach)
+    around = _copy(scene, start, whole.reach) if NEARBY < whole.reach < 1 else start.rows
     made = cut(scene, whole.polytope, start.keep, corners, around)
     final = {*action.ending} & {*action.hard}
     # Cells without a point to cut off miss the polytope, and are settled in the next rounds.
