@@ -34,11 +34,11 @@ from benchmarks import (
 from certifier.errors import CirisError
 from client.output import Screen, print_json
 
-OK, CONTRADICTED, BAD_INPUT = 0, 1, 2
+OK, FAILED, BAD_INPUT = 0, 1, 2
 
 
 def main() -> int:
-    """Runs one benchmark. It returns exit status 1 when verdicts contradict each other."""
+    """Runs one benchmark. It returns exit status 1 when verdicts contradict each other, or when a step of an arm failed."""
     logging.getLogger("drake").setLevel(logging.WARNING)
     args = _parser().parse_args()
     if args.benchmark == "docs":
@@ -54,7 +54,8 @@ def main() -> int:
         print_json(document)
     else:
         print(report.text(document))
-    return CONTRADICTED if compare.Verdict.CONTRADICTION in (document.get("verdicts") or {}) else OK
+    contradicted = compare.Verdict.CONTRADICTION in (document.get("verdicts") or {})
+    return FAILED if contradicted or any(row.get("failed") for row in document.get("rows", [])) else OK
 
 
 def _pairs(args: Namespace, screen: Screen) -> dict[str, Any]:
@@ -180,7 +181,8 @@ def _parser() -> ArgumentParser:
     shipped.add_argument(
         "--deadline", type=_seconds, default=robots.DEADLINE, metavar="SECONDS", help=f"for each region; default {robots.DEADLINE:g}"
     )
-    held = kinds.add_parser("arms", parents=[as_json], help="take makers' arms with their hands from installed wheels to planned motions")
+    made = "take makers' arms with their hands from installed wheels to planned motions; the exit status is 1 if a step failed"
+    held = kinds.add_parser("arms", parents=[as_json], help=made)
     held.add_argument("arms", nargs="*", metavar="ARM", default=list(makers.ARMS), help=f"default: all; {', '.join(makers.ARMS)}")
     held.add_argument(
         "--deadline", type=_seconds, default=makers.DEADLINE, metavar="SECONDS", help=f"for each region; default {makers.DEADLINE:g}"

@@ -4,7 +4,8 @@
 
 Let a revolute joint have the axis u, and let R* = R(q*). With the half-angle substitution s = tan((q - q*)/2) its terms are
 T0 = diag(R*, 1), T1 = diag(2 R*[u], 0), T2 = diag(R*(I + 2[u]^2), 1).
-A prismatic joint has T0 = [I, u q*; 0, 1], T1 = [0, u; 0, 0], and no denominator. A weld contributes its fixed transform.
+A prismatic joint has T0 = [I, u q*; 0, 1], T1 = [0, u; 0, 0], and no denominator; u is as long as it slides fast. A weld contributes its
+fixed transform.
 
 On the way up the tree the inverse joint is used: u becomes -u, R* becomes R*', and the outer transforms are inverted and swapped.
 

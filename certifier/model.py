@@ -48,7 +48,8 @@ class Joint:
         kind: revolute, prismatic or weld.
         parent: name of the body on the side of the world.
         child: name of the other body.
-        axis: (3,) unit axis in F (zeros for a weld).
+        axis: (3,) axis in F, a unit vector (zeros for a weld). Of a joint that slides and follows another one, its length is the speed:
+            by how many metres it slides for a metre of its position.
         X_PF: (4, 4) pose of F, which is fixed on the parent, metres. A weld's own offset is folded into it.
         X_BM: (4, 4) pose of M, which is fixed on the child, metres.
         index: position index in q and s; None for a weld.
@@ -76,6 +77,13 @@ class Joint:
     def unit(self) -> Literal["rad", "m"]:
         """Returns the unit of the joint's position."""
         return "rad" if self.kind is JointKind.REVOLUTE else "m"
+
+    @property
+    def speed(self) -> float:
+        """Returns by how many metres the joint slides for a metre of its position; 0 for one that does not slide."""
+        if self.kind is not JointKind.PRISMATIC:
+            return 0.0
+        return float(np.linalg.norm(self.axis)) if self.follows else 1.0
 
     @property
     def shown(self) -> tuple[Literal["deg", "m"], float]:
@@ -180,6 +188,12 @@ class Scene(ConfigurationSpace):
     def following(self) -> tuple[Joint, ...]:
         """Returns the joints that move with another one."""
         return tuple(j for j in self.joints if j.follows)
+
+    @property
+    def in_order(self) -> str:
+        """Returns the names of the n joints in position order, and which ones follow them, for the hint of an error."""
+        behind = [f"{joint.name} follows {self.moving[joint.index or 0].name}" for joint in self.following]
+        return "; ".join([f"in order: {', '.join(joint.name for joint in self.moving)}", *behind])
 
     @cached_property
     def q_lower(self) -> Array:

@@ -20,7 +20,7 @@ from client.options import CERTIFY, GROW
 from client.output import Screen, print_json
 from client.polytopes import polytope_file
 from client.request import refuse_of_service, request
-from client.seeds import seed_of
+from client.seeds import seed_of, whence
 
 OK, NO = 0, 1
 
@@ -98,6 +98,14 @@ def scene_show(args: Namespace) -> int:
 
 
 def grow(args: Namespace) -> int:
+    try:
+        return _grow(args)
+    except CirisError as error:
+        error.field = whence(error.field, args.scene, (getattr(args, "seed.q") or [None])[0])
+        raise
+
+
+def _grow(args: Namespace) -> int:
     screen = Screen()
     if args.local:
         from client.local import check_is_file

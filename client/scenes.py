@@ -165,9 +165,8 @@ def _configuration(scene: Scene, args: Namespace) -> tuple[np.ndarray, str]:
         return scene.q_star.clip(scene.q_lower + inside, scene.q_upper - inside), "q*"
     q = positions_of(scene, seed_of(args.path, args.q), "--q" if args.q is not None else seed.name)
     if len(q) != scene.n:
-        names = ", ".join(joint.name for joint in scene.moving)
         field = seed.name if args.q is None else "--q"
-        raise CirisError("seed_wrong_length", f"{len(q)} numbers for {scene.n} joints", field=field, hint=f"in order: {names}")
+        raise CirisError("seed_wrong_length", f"{len(q)} numbers for {scene.n} joints", field=field, hint=scene.in_order)
     return np.array(q), "--q" if args.q is not None else seed.name
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import yaml
@@ -38,4 +39,11 @@ def seed_of(scene: str, q: str | None) -> Given:
         return configuration(written if isinstance(written, str) else " ".join(str(float(value)) for value in written), f"{path}: q")
     except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError):
         hint = "write q: [0, 0.3] into it, one number for each joint"
-        raise CirisError("seed_file", f"{path} holds no list of numbers called q", field="--q", hint=hint) from None
+        raise CirisError("seed_file", "it holds no list of numbers called q", field=str(path), hint=hint) from None
+
+
+def whence(field: str | None, scene: str, q: str | None) -> str | None:
+    """Returns the place of an error in a request about a seed: where the seed was not given as ``q``, its file has the place."""
+    if q is not None or not field or not re.match(r"seed\.q(?![\w.])", field):
+        return field
+    return f"{seed_file(scene)}: {field.removeprefix('seed.')}"

@@ -15,6 +15,5 @@ def check_length(scene: Scene, values: Sequence[float], field: str, code: str) -
         RegionError: ``code``, at ``field``.
     """
     if len(values) != scene.n:
-        names = ", ".join(joint.name for joint in scene.moving)
         message = f"{len(values)} numbers were given; {scene.name} has {scene.n} joints"
-        raise RegionError(code, message, field=field, hint=f"in the order {names}")
+        raise RegionError(code, message, field=field, hint=scene.in_order)

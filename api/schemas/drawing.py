@@ -25,7 +25,7 @@ class DrawnJoint(BaseModel):
     kind: JointKind = Field(description="How the joint moves.")
     parent: str = Field(description="The body on the side of the world.")
     child: str = Field(description="The body on the side of the hand.")
-    axis: list[float] = Field(description="(3,) unit axis in F; zeros for a weld.")
+    axis: list[float] = Field(description="(3,) axis in F; the joint slides by its position times the axis. Zeros for a weld.")
     X_PF: Pose
     X_BM: Pose
     index: int | None = Field(description="Place in q; null for a weld.")

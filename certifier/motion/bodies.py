@@ -26,7 +26,7 @@ class Bodies(NamedTuple):
         parents: (L,) number of each link's parent, which is smaller than its own; link 0 is the world.
         joints: (L,) position index of the joint that moves the link.
         slides: (L,) whether that joint is prismatic.
-        axes: (L, 3) unit vectors along the joints' axes.
+        axes: (L, 3) the joints' axes, as the scene has them.
         rotations, offsets: (L, 3, 3) and (L, 3) of the fixed poses X_PF, metres.
         roots: (L,) number among the scene's bodies of the one that the link's joint moves.
         turned: (L, 3, 3) rotations of the links' frames in the frames of these bodies.

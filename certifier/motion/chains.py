@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from certifier.kinematics import Kinematics, rigid_inverse
-from certifier.model import Array, JointKind
+from certifier.model import Array
 
 
 class Chain(NamedTuple):
@@ -19,16 +19,16 @@ class Chain(NamedTuple):
     Attributes:
         rotations: (m + 1, 3, 3) of the fixed poses.
         offsets: (m + 1, 3) of the fixed poses, metres.
-        axes: (m, 3) unit vectors; that of a joint that is crossed from child to parent is reversed.
+        axes: (m, 3) as the scene has them; that of a joint that is crossed from child to parent is reversed.
         joints: (m,) position indices.
-        slides: (m,) whether each joint is prismatic.
+        speeds: (m,) of the prismatic joints (certifier.model.Joint.speed); 0 for revolute ones.
     """
 
     rotations: Array
     offsets: Array
     axes: Array
     joints: np.ndarray
-    slides: np.ndarray
+    speeds: Array
 
 
 class Lengths(NamedTuple):
@@ -36,7 +36,7 @@ class Lengths(NamedTuple):
 
     Attributes:
         offsets: (m,) of the fixed pose before each joint.
-        across: (m,) of the part of it that is across the axis of the joint before; 0 for the first joint.
+        across: (m,) of the part of it that is across the axis of the joint before, where that turns; 0 for the first joint.
         tail: how far a vertex is from the origin of the last joint's frame at most.
         tail_across: how far a vertex is from the last joint's axis at most; 0 where there is no joint.
         size: the sum of all lengths on the way from the frame to a vertex, but for what prismatic joints add.
@@ -72,7 +72,7 @@ def chain(kinematics: Kinematics, frame: str, body: str) -> Chain:
         np.ascontiguousarray(poses[:, :3, 3]),
         np.array(axes).reshape(-1, 3),
         np.array([joint.index for joint in moving], dtype=np.int64),
-        np.array([joint.kind is JointKind.PRISMATIC for joint in moving], dtype=np.bool_),
+        np.array([joint.speed for joint in moving]),
     )
 
 
@@ -92,25 +92,25 @@ def lengths(chain: Chain, vertices: Array) -> Lengths:
 
 @njit(cache=True)
 def fill_levers(
-    joints: np.ndarray, slides: np.ndarray, offsets: Array, across: Array, tail: float, tail_across: float, reaches: Array, levers: Array
+    joints: np.ndarray, speeds: Array, offsets: Array, across: Array, tail: float, tail_across: float, reaches: Array, levers: Array
 ) -> float:
     """Fills in the levers of a chain, (m,), and returns how far its prismatic joints slide together at most, metres.
 
-    A lever says how far a vertex can be from a joint's axis at most, in metres, and is 1 for a prismatic joint. A change of the joint's
-    position moves no vertex farther than by the lever times the change.
+    A lever says how far a vertex can be from a joint's axis at most, in metres, and is the speed of a prismatic joint. A change of the
+    joint's position moves no vertex farther than by the lever times the change.
 
     Args:
-        joints, slides: of the chain.
+        joints, speeds: of the chain.
         offsets, across, tail, tail_across: its lengths.
         reaches: (n,) how far each joint's position is from 0 at most.
     """
     # Behind a joint come a fixed offset, of which only the part across the axis counts, and what is behind the next joint.
     lever, behind, slid = tail_across, tail, 0.0
     for k in range(len(joints) - 1, -1, -1):
-        levers[k] = 1.0 if slides[k] else lever
-        if slides[k]:
-            behind += reaches[joints[k]]
-            slid += reaches[joints[k]]
+        levers[k] = speeds[k] if speeds[k] > 0.0 else lever
+        if speeds[k] > 0.0:
+            behind += speeds[k] * reaches[joints[k]]
+            slid += speeds[k] * reaches[joints[k]]
         lever = across[k] + behind
         behind += offsets[k]
     return slid

@@ -65,7 +65,7 @@ def curved(scene: Scene, found: Curve, space: Space, field: str = "bezier") -> M
     """
     motion = Motion(space, found.controls, found.degree)
     if found.controls.shape[1] != scene.n:
-        hint = f"give {scene.n} numbers for each, in the scene's order of joints"
+        hint = f"give {scene.n} numbers for each, {scene.in_order}"
         raise RegionError("motion_shape", f"the control points have {found.controls.shape[1]} coordinates each", field=field, hint=hint)
     _check_scene(scene, motion.pieces + 1, field)
     lower, upper = space.limits(scene)
@@ -86,10 +86,14 @@ def _numbers(scene: Scene, waypoints: Any, field: str) -> Array:
         points = np.array(waypoints, dtype=float)
     except (TypeError, ValueError):
         points = None
-    if points is None or points.ndim != 2 or points.shape[1] != scene.n or len(points) < 2:
-        hint = f"give two or more, with {scene.n} numbers each, in the scene's order of joints"
-        shape = "no lists of numbers of one length" if points is None else f"of shape {points.shape}"
-        raise RegionError("motion_shape", f"the waypoints are {shape}", field=field, hint=hint)
+    hint = f"give two or more, with {scene.n} numbers each, {scene.in_order}"
+    if points is None or points.ndim != 2:
+        raise RegionError("motion_shape", "the waypoints are no lists of numbers of one length", field=field, hint=hint)
+    if points.shape[1] != scene.n:
+        message = f"each waypoint has {points.shape[1]} numbers, and the scene has {scene.n} joints that move"
+        raise RegionError("motion_shape", message, field=field, hint=hint)
+    if len(points) < 2:
+        raise RegionError("motion_shape", f"a motion has two waypoints or more, not {len(points)}", field=field, hint=hint)
     _check_scene(scene, len(points), field)
     check_magnitude(points, field, code="motion_not_finite")
     return points

@@ -166,8 +166,9 @@ def _slack(ground: Ground, pair: int, reach: float) -> float:
     joints, size, way = 2, 0.0, views.ways[views.frames[choice]]
     for k in range(2):
         view = views.sides[choice, k]
-        joints += views.begins[view + 1] - views.begins[view]
-        size += ground.lengths[view]
+        first, end = views.begins[view], views.begins[view + 1]
+        joints += end - first
+        size += ground.lengths[view] + views.speeds[first:end].sum()  # what the position of a slide is wrong by counts times its speed
         way += views.ways[ground.bodies.links[ground.bodies.pairs[pair, k]]]
     largest = np.abs(ground.curve.controls).max()
     return ROUNDED * (reach + joints * size * (1.0 + largest)) + 2.0**-46 * way

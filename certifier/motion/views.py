@@ -24,7 +24,7 @@ class Views(NamedTuple):
 
     Attributes:
         begins: (W + 1,) where each view's joints begin in the arrays below, and J.
-        joints, slides: (J,) of the chains (certifier.motion.chains.Chain).
+        joints, speeds: (J,) of the chains (certifier.motion.chains.Chain).
         offsets, across: (J,) of the chains (certifier.motion.chains.Lengths).
         tails, tails_across, sizes: (W,) of the chains.
         first: (P + 1,) where each pair's choices begin, and C.
@@ -35,7 +35,7 @@ class Views(NamedTuple):
 
     begins: np.ndarray
     joints: np.ndarray
-    slides: np.ndarray
+    speeds: Array
     offsets: Array
     across: Array
     tails: Array
@@ -70,7 +70,7 @@ def views_of(scene: Scene) -> Views:
     return Views(
         begins=np.array([0, *accumulate(len(one.joints) for one in chains)], dtype=np.int64),
         joints=np.concatenate([np.zeros(0, dtype=np.int64), *(one.joints for one in chains)]),
-        slides=np.concatenate([np.zeros(0, dtype=np.bool_), *(one.slides for one in chains)]),
+        speeds=np.concatenate([np.zeros(0), *(one.speeds for one in chains)]),
         offsets=np.concatenate([np.zeros(0), *(one.offsets for one in measured)]),
         across=np.concatenate([np.zeros(0), *(one.across for one in measured)]),
         tails=np.array([one.tail for one in measured]),
@@ -102,7 +102,7 @@ def levers_of(views: Views, reaches: Array) -> tuple[Array, Array]:
     levers, sizes = np.empty(len(views.joints)), np.empty(len(views.sizes))
     for view in range(len(sizes)):
         own = slice(views.begins[view], views.begins[view + 1])
-        chain = views.joints[own], views.slides[own], views.offsets[own], views.across[own]
+        chain = views.joints[own], views.speeds[own], views.offsets[own], views.across[own]
         sizes[view] = views.sizes[view] + fill_levers(*chain, views.tails[view], views.tails_across[view], reaches, levers[own])
     return levers, sizes
 
@@ -113,8 +113,8 @@ def acceleration(views: Views, view: int, levers: Array, rates: Array, changes: 
     turning, total = 0.0, 0.0
     for k in range(views.begins[view], views.begins[view + 1]):
         rate, change = rates[views.joints[k]], changes[views.joints[k]]
-        if views.slides[k]:
-            total += 2.0 * turning * rate + change
+        if views.speeds[k] > 0.0:
+            total += levers[k] * (2.0 * turning * rate + change)
         else:
             total += levers[k] * (rate * (rate + 2.0 * turning) + change)
             turning += rate

@@ -24,6 +24,8 @@ VERTICES = 4_096
 """A geometry has at most this many vertices."""
 MAGNITUDE = positions.MAGNITUDE
 """No length, in metres, and no joint position, limit or q*, in metres or radians, is larger than this."""
+SPEEDS = 2.0**-10, 2.0**10
+"""Least and largest length of the axis of a slide that follows another joint: how far it moves for a metre of that one."""
 PAIRS = 20_000
 """This limit holds for the pairs to prove, and again for those that are ignored."""
 

@@ -24,15 +24,16 @@ def own_configurations(scene: Scene, given: Mapping[str, Given]) -> dict[str, di
         SceneError: ``scene_field`` for a wrong number of positions, or one that its joint cannot have; ``unknown_name``.
     """
     moving = {joint.name: joint for joint in scene.moving}
+    leaders = {joint.name: scene.moving[joint.index or 0].name for joint in scene.following}
     found = {}
     for name, said in given.items():
         field = f"configurations.{name}"
         if isinstance(said, tuple):
             if len(said) != scene.n:
                 message = f"has {len(said)} numbers for {scene.n} joints"
-                raise SceneError("scene_field", message, field=field, hint=f"in order: {', '.join(moving)}")
+                raise SceneError("scene_field", message, field=field, hint=scene.in_order)
             said = dict(zip(moving, said, strict=True))
-        found[name] = by_full_name(said, moving, field)
+        found[name] = by_full_name(said, moving, field, leaders)
         for joint, value in found[name].items():
             if wrong := _outside(scene, joint, value):
                 raise SceneError("scene_field", wrong, field=f"{field}.{joint}", hint="move it between them")
@@ -91,12 +92,12 @@ def _of_followers(scene: Scene, given: Mapping[str, float], positions: dict[str,
     """Adds the positions of leaders of which a state names followers alone, and returns what is wrong with a follower's position."""
     for name, mimic in followers.items():
         if name in given:
-            meant = (given[name] - mimic.offset) / mimic.factor
             if mimic.leader not in positions:
+                meant = (given[name] - mimic.offset) / mimic.factor
                 if wrong := _outside(scene, mimic.leader, meant):
                     return f"{name} is at {given[name]:.9g}, so {wrong}"
                 positions[mimic.leader] = meant
-            elif abs(positions[mimic.leader] - meant) > EXACT:
+            elif abs(mimic.factor * positions[mimic.leader] + mimic.offset - given[name]) > EXACT:
                 return f"joint {name} is at {given[name]:.9g}, and {mimic.leader}, which it follows, at {positions[mimic.leader]:.9g}"
     return None
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-import numpy as np
 from pydrake.geometry import QueryObject
 
 from certifier.model import Array, Pair, Scene
-from certifier.scene.drake_model import build_diagram, geometry_name, in_drake
+from certifier.scene.drake_model import InDrake, build_diagram, geometry_name
 
 
 def touching(scene: Scene, configurations: Iterable[Array]) -> Iterator[set[Pair]]:
@@ -36,9 +35,9 @@ def _queries(scene: Scene, configurations: Iterable[Array]) -> Iterator[QueryObj
     context = diagram.CreateDefaultContext()
     plant, scene_graph = diagram.plant(), diagram.scene_graph()
     plant_context = plant.GetMyContextFromRoot(context)
-    own = in_drake(scene, plant)
+    own = InDrake(scene, plant)
     for q in configurations:
-        plant.SetPositions(plant_context, np.asarray(q)[own])
+        plant.SetPositions(plant_context, own.at(q))
         yield scene_graph.get_query_output_port().Eval(scene_graph.GetMyContextFromRoot(context))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import Capsule, CollisionFilterDeclaration, Convex, GeometryId, GeometrySet, SceneGraphInspector, Shape, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
@@ -19,7 +18,7 @@ _INSTANCE = "scene"
 def build_diagram(scene: Scene) -> RobotDiagram:
     """Returns the scene as a Drake diagram, with the same joint positions in the same order. Only ``scene.pairs`` can collide in it.
 
-    Joints that follow others have positions of their own in it (:func:`in_drake`).
+    Joints that follow others have positions of their own in it (:class:`InDrake`).
 
     The geometries are the scene's conv(vertices) + ball(radius), without padding. So a configuration is free when the signed distance of
     every pair is more than twice its padding. Drake's names of bodies, joints and geometries are :func:`drake_name`, and
@@ -51,10 +50,24 @@ def build_diagram(scene: Scene) -> RobotDiagram:
     return builder.Build()
 
 
-def in_drake(scene: Scene, plant: MultibodyPlant) -> NDArray[np.int64]:
-    """Returns which of the scene's positions each of Drake's is, (N,): Drake's positions at q, (n,), are q[in_drake(scene, plant)]."""
-    starts = {plant.GetJointByName(drake_name(joint.name)).position_start(): joint.index for joint in (*scene.moving, *scene.following)}
-    return np.array([starts[i] for i in range(plant.num_positions())], dtype=np.int64)
+class InDrake:
+    """Gives the positions of the joints of :func:`build_diagram` at those of the scene.
+
+    Args:
+        plant: of the diagram.
+    """
+
+    def __init__(self, scene: Scene, plant: MultibodyPlant) -> None:
+        every = {plant.GetJointByName(drake_name(joint.name)).position_start(): joint for joint in (*scene.moving, *scene.following)}
+        joints = [every[i] for i in range(plant.num_positions())]
+        self._index = np.array([joint.index for joint in joints], dtype=np.int64)
+        # Drake's axes are unit vectors, so a joint that slides faster than the one that it follows is farther along its own.
+        self._speeds = np.array([joint.speed or 1.0 for joint in joints])
+
+    def at(self, q: Array) -> Array:
+        """Returns Drake's positions, (N,), at q, (n,)."""
+        found: Array = np.asarray(q)[self._index] * self._speeds
+        return found
 
 
 def check_independent(scene: Scene) -> None:
@@ -91,8 +104,11 @@ def _add_joint(plant: MultibodyPlant, joint: Joint, bodies: dict[str, RigidBody]
         return
     F = plant.AddFrame(FixedOffsetFrame(f"{name}/F", parent.body_frame(), X_PF, child.model_instance()))
     M = plant.AddFrame(FixedOffsetFrame(f"{name}/M", child.body_frame(), X_BM, child.model_instance()))
-    kind = RevoluteJoint if joint.kind is JointKind.REVOLUTE else PrismaticJoint
-    plant.AddJoint(kind(name, F, M, joint.axis, joint.lower, joint.upper))
+    if joint.kind is JointKind.REVOLUTE:
+        plant.AddJoint(RevoluteJoint(name, F, M, joint.axis, joint.lower, joint.upper))
+        return
+    limits = np.array([joint.lower, joint.upper], dtype=float) * joint.speed
+    plant.AddJoint(PrismaticJoint(name, F, M, joint.axis, *limits))
 
 
 def _add_geometry(plant: MultibodyPlant, geometry: Geometry, bodies: dict[str, RigidBody]) -> GeometryId:

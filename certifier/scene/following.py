@@ -1,10 +1,11 @@
 """Joints that follow another one move with it here: both have the same position, and the follower's axis and frame say how it moves.
 
-A follower is at ``factor`` times the position of its leader, plus ``offset``. With a factor of -1, its axis points the other way. The
-offset becomes a part of its fixed frame X_PF. The limits of the leader become those at which all followers are within theirs.
+A follower is at ``factor`` times the position of its leader, plus ``offset``. The factor becomes a part of its axis: with a negative one it
+points the other way, and the axis of a follower that slides is as long as the factor says. The offset becomes a part of its fixed frame
+X_PF. The limits of the leader become those at which all followers are within theirs.
 
-With another factor, s = tan((q - q*)/2) of a follower that turns is no rational function of low degree in that of its leader. So such
-joints are held or swept.
+With another factor than 1 and -1, s = tan((q - q*)/2) of a follower that turns is no rational function of low degree in that of its leader.
+So such joints are held or swept.
 """
 
 from __future__ import annotations
@@ -17,9 +18,12 @@ import numpy as np
 
 from certifier.errors import SceneError
 from certifier.kinematics import Kinematics
-from certifier.model import WORLD, Joint, Scene
-from certifier.scene.joints import Coupling, motion, range_of
+from certifier.model import WORLD, Joint, JointKind, Scene
+from certifier.scene.joints import EXACT, Coupling, motion, range_of
 from certifier.scene.mimics import Mimic, mimic_of
+
+SPEEDS = 1e-3, 1e3
+"""Least and largest multiplier, in magnitude, of a joint that slides and follows another one."""
 
 
 def followers_of(
@@ -45,7 +49,7 @@ def followers_of(
         while len(lines) < 1 + len(group):
             known = next((c for c in group if len({*c.factors} & {*lines}) == len(c.factors) - 1 == 1), None)
             if known is None:
-                raise _refused(leader, [*dict.fromkeys(name for c in group for name in c.factors)], "by other equations than mimic joints")
+                raise _no_tree(leader, group)
             (of_it, factor), (other, own) = sorted(known.factors.items(), key=lambda item: item[0] not in lines)
             of_leader, offset = lines[of_it]
             lines[other] = -factor * of_leader / own, (known.constant - factor * offset) / own
@@ -71,7 +75,10 @@ def leading(joints: Sequence[Joint], followers: Mapping[str, Mimic]) -> list[Joi
         lower, upper = (max(range_of(leader)[0], lower), min(range_of(leader)[1], upper))
         if lower >= upper:
             message = f"joint {mimic.follower} follows {mimic.leader}, and there is no range of positions with both within their limits"
-            hint = f"mend the limits in the model, or hold the joints, as in fix: {{{mimic.leader}: 0}}"
+            mend = "mend the limits, the multiplier or the offset in the model"
+            single = abs(mimic.factor) * (lower - upper) <= EXACT and lower - upper <= EXACT
+            held = f"hold them at the only position, by fix: {{{mimic.leader}: {(lower + upper) / 2:.12g}}}; or "
+            hint = f"{held if single else 'they can be held nowhere either: '}{mend}"
             raise SceneError("joint_range", message, field="directives", hint=hint)
         found[mimic.leader] = replace(leader, lower=lower, upper=upper)
     return list(found.values())
@@ -115,11 +122,18 @@ def said_of(followers: Mapping[str, Mimic], scene: Scene) -> list[str]:
     """Returns sentences for people about the joints that follow."""
     found = []
     for joint in scene.moving:
-        behind = [name for name, mimic in followers.items() if mimic.leader == joint.name]
+        behind = [f"{name}{_where(mimic)}" for name, mimic in followers.items() if mimic.leader == joint.name]
         if behind:
             ends = f"{joint.lower:.9g} to {joint.upper:.9g} {joint.unit}"
             found.append(f"joint {joint.name} takes {', '.join(behind)} with it: one coordinate, from {ends}, moves them all")
     return found
+
+
+def _where(mimic: Mimic) -> str:
+    """Returns where a follower is, for people; "" where it has the position of its leader."""
+    times = "" if mimic.factor == 1 else f"{mimic.factor:.9g} times "
+    added = f" {'minus' if mimic.offset < 0 else 'plus'} {abs(mimic.offset):.9g}" if mimic.offset else ""
+    return f" (at {times}its position{added})" if times or added else ""
 
 
 def _group(couplings: Sequence[Coupling]) -> list[Coupling]:
@@ -146,12 +160,24 @@ def _check(follower: Joint, leader: Joint, mimic: Mimic) -> None:
             f"joint {follower.name} follows {leader.name} (mimic), but one slides and the other turns; such joints cannot move in ciris"
         )
         raise SceneError("unsupported_joint", message, field="directives", hint=f"{_still(leader.name)}; the other follows")
-    if abs(mimic.factor) != 1:
-        raise _refused(leader.name, names, f"with the multiplier {mimic.factor:.9g}")
+    if follower.kind is JointKind.REVOLUTE and abs(mimic.factor) != 1:
+        allowed = "joints that turn move with a multiplier of 1 or -1"
+    elif follower.kind is JointKind.PRISMATIC and not SPEEDS[0] <= abs(mimic.factor) <= SPEEDS[1]:
+        allowed = f"joints that slide move with one from {SPEEDS[0]:g} to {SPEEDS[1]:g}, or from -{SPEEDS[1]:g} to -{SPEEDS[0]:g}"
+    else:
+        return
+    message = f"joints {' and '.join(names)} are coupled (mimic) with the multiplier {mimic.factor:.9g}; in ciris, {allowed}"
+    raise SceneError("unsupported_joint", message, field="directives", hint=f"{_still(leader.name)}; the others follow")
 
 
-def _refused(leader: str, names: Sequence[str], how: str) -> SceneError:
-    message = f"joints {' and '.join(names)} are coupled (mimic) {how}; such joints cannot move in ciris, only with a multiplier of 1 or -1"
+def _no_tree(leader: str, group: Sequence[Coupling]) -> SceneError:
+    """Returns the error for joints that do not follow the leader one after the other."""
+    names = [*dict.fromkeys(name for coupling in group for name in coupling.factors)]
+    if len(group) >= len(names) and all(len(coupling.factors) == 2 for coupling in group):
+        circle = f"joints {' and '.join(names)} follow each other in a circle (mimic), so none of them leads"
+        hint = f"remove one of their mimic elements in the model; or {_still(leader)}"
+        return SceneError("unsupported_joint", circle, field="directives", hint=hint)
+    message = f"joints {' and '.join(names)} are coupled by other equations than mimic joints; such joints cannot move in ciris"
     return SceneError("unsupported_joint", message, field="directives", hint=f"{_still(leader)}; the others follow")
 
 
@@ -161,17 +187,22 @@ def _still(joint: str) -> str:
 
 def _within(mimic: Mimic, lower: float, upper: float) -> tuple[float, float]:
     """Returns the leader's positions at which the follower is within its limits, rounded inwards."""
-    first, last = sorted((mimic.factor * (limit - mimic.offset), limit) for limit in (lower, upper))
-    return _inwards(mimic, *first, np.inf), _inwards(mimic, *last, -np.inf)
+    first, last = sorted(_leader_at(mimic, limit) for limit in (lower, upper))
+    return _inwards(first, np.inf), _inwards(last, -np.inf)
 
 
-def _inwards(mimic: Mimic, position: float, limit: float, towards: float) -> float:
-    """Returns the double that is nearest to where a follower is at a limit, on the side of ``towards``."""
-    if not np.isfinite(limit):
-        return position
-    exactly = Fraction(mimic.factor) * (Fraction(limit) - Fraction(mimic.offset))
-    beyond = Fraction(position) < exactly if towards > 0 else Fraction(position) > exactly
-    return float(np.nextafter(position, towards)) if beyond else position
+def _leader_at(mimic: Mimic, position: float) -> Fraction | float:
+    """Returns exactly where the leader is when the follower is at a position, which may be infinite."""
+    if not np.isfinite(position):
+        return position if mimic.factor > 0 else -position
+    return (Fraction(position) - Fraction(mimic.offset)) / Fraction(mimic.factor)
+
+
+def _inwards(exactly: Fraction | float, towards: float) -> float:
+    """Returns the double that is nearest to a position, on the side of ``towards``."""
+    nearest = float(exactly)
+    beyond = nearest < exactly if towards > 0 else nearest > exactly
+    return float(np.nextafter(nearest, towards)) if beyond else nearest
 
 
 def _following(joint: Joint, leader: Joint, mimic: Mimic) -> Joint:

@@ -78,14 +78,17 @@ def held(joints: Sequence[Joint], at: Mapping[str, float]) -> list[Joint]:
     return [_welded(j, at[j.name]) if j.name in at else replace(j, index=number.get(j.name)) for j in joints]
 
 
-def narrowed(joints: Sequence[Joint], limits: Mapping[str, tuple[float, float]]) -> list[Joint]:
+def narrowed(joints: Sequence[Joint], limits: Mapping[str, tuple[float, float]], leaders: Mapping[str, str] | None = None) -> list[Joint]:
     """Returns the joints with the limits that the scene file gives them, which are within their own.
+
+    Args:
+        leaders: of the joints that follow another one, by their full names.
 
     Raises:
         SceneError: ``unknown_name``; ``scene_field`` for limits outside of the joint's own.
     """
     by_name = {j.name: j for j in joints if j.index is not None}
-    given = by_full_name(limits, by_name, "limits")
+    given = by_full_name(limits, by_name, "limits", leaders)
     for name, (lower, upper) in given.items():
         own_lower, own_upper = range_of(by_name[name])
         if lower < own_lower - EXACT or upper > own_upper + EXACT:
@@ -94,11 +97,14 @@ def narrowed(joints: Sequence[Joint], limits: Mapping[str, tuple[float, float]])
     return [replace(j, lower=given[j.name][0], upper=given[j.name][1]) if j.name in given else j for j in joints]
 
 
-def centered(joints: Sequence[Joint], q_star: Sequence[float] | None) -> tuple[list[Joint], Array]:
+def centered(
+    joints: Sequence[Joint], q_star: Sequence[float] | None, leaders: Mapping[str, str] | None = None
+) -> tuple[list[Joint], Array]:
     """Returns the joints, with windows for those that turn as far as s stands for, or nearly, and q*, (n,).
 
     Args:
         q_star: as in the scene file; None for the middle of the joint limits, or 0 where a joint has none.
+        leaders: of the joints that follow another one, by their full names.
 
     Raises:
         SceneError: ``no_joints``, ``scene_field``, or ``joint_range`` for a range without an interior or a slide without limits.
@@ -110,7 +116,8 @@ def centered(joints: Sequence[Joint], q_star: Sequence[float] | None) -> tuple[l
     if q_star is not None and len(q_star) != len(moving):
         names = ", ".join(j.name for j in moving)
         message = f"has {len(q_star)} numbers for {len(moving)} joints"
-        raise SceneError("scene_field", message, field="q_star", hint=f"in order: {names}")
+        behind = [f"{follower} follows {leader}" for follower, leader in (leaders or {}).items()]
+        raise SceneError("scene_field", message, field="q_star", hint="; ".join([f"in order: {names}", *behind]))
     centers = [_middle(j) for j in moving] if q_star is None else list(q_star)
     found = {j.name: _windowed(j, center) for j, center in zip(moving, centers, strict=True)}
     return [found.get(j.name, j) for j in joints], np.array(centers)
@@ -151,24 +158,31 @@ def _windowed(joint: Joint, center: float) -> Joint:
     return replace(joint, lower=window[0], upper=window[1], own_limits=(own[0], own[1]))
 
 
-def by_full_name(said: Mapping[str, T], joints: Mapping[str, Joint], field: str) -> dict[str, T]:
+def by_full_name(said: Mapping[str, T], joints: Mapping[str, Joint], field: str, leaders: Mapping[str, str] | None = None) -> dict[str, T]:
     """Returns what a scene file says of joints by their full names.
+
+    Args:
+        leaders: of the joints that follow another one, by their full names.
 
     Raises:
         SceneError: ``unknown_name``; ``scene_field`` for a joint that is named twice.
     """
     found: dict[str, T] = {}
     for name, value in said.items():
-        full = _known(name, joints, field)
+        full = _known(name, joints, field, leaders or {})
         if full in found:
             raise SceneError("scene_field", f"joint {full} is named twice", field=f"{field}.{name}", hint="leave one of them out")
         found[full] = value
     return found
 
 
-def _known(name: str, joints: Mapping[str, Joint], field: str) -> str:
+def _known(name: str, joints: Mapping[str, Joint], field: str, leaders: Mapping[str, str]) -> str:
     """Returns the full name of a joint that can move, which a scene file may give without its model where this is clear."""
     fitting = [full for full in joints if name in (full, full.rsplit("/", 1)[-1])]
+    following = [full for full in leaders if name in (full, full.rsplit("/", 1)[-1])]
+    if not fitting and len(following) == 1:
+        message = f"joint {following[0]} follows {leaders[following[0]]} (mimic), so it has no position of its own"
+        raise SceneError("unknown_name", message, field=f"{field}.{name}", hint=f"name {leaders[following[0]]}, which takes it along")
     if len(fitting) != 1:
         what = f"fits {' and '.join(fitting)}" if fitting else "is no joint of the scene that can move"
         hint = "write model/joint" if fitting else close_matches(name, list(joints)) or f"joints: {', '.join(joints)}"

@@ -107,7 +107,9 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     marked = {names.joint(plant.GetJointByName(name, plant.GetModelInstanceByName(model))) for model, name in strict.followers}
     followers = following.followers_of(every, coupled, welded, marked)
     limits = others_of(scene_file.limits, sweeps, every)
-    leaders, q_star = centered(narrowed(held(following.leading(every, followers), welded), limits), scene_file.q_star)
+    leader_of = {name: mimic.leader for name, mimic in followers.items()}
+    free = narrowed(held(following.leading(every, followers), welded), limits, leader_of)
+    leaders, q_star = centered(free, scene_file.q_star, leader_of)
     tree = Tree(following.with_followers(leaders, every, followers), list(names.bodies))
     reached, faults = dict[str, float](), dict[str, str]()
     sweeper = Sweeper(tree, sweeps, scene_file.max_vertices)
@@ -151,6 +153,7 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     document["warnings"] = (
         warnings
         + said_of(sweeps)
+        + [f"joint {name} has the multiplier 0 (mimic), so it never moves: it is held at {at[name]:.9g}" for name in _at_rest(coupled)]
         + following.said_of(followers, scene)
         + unused
         + without
@@ -158,6 +161,11 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
         + findings(scene, tree, candidates, drawn, files)
     )
     return document
+
+
+def _at_rest(coupled: list[Coupling]) -> list[str]:
+    """Returns the joints that follow another one with the multiplier 0, by their full names."""
+    return [name for coupling in coupled if len(coupling.factors) == 1 for name in coupling.factors]
 
 
 def read_models(scene_file: SceneFile, plant: MultibodyPlant, copies: Copies) -> list[str]:

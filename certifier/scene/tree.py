@@ -45,12 +45,12 @@ class Tree:
         """Returns a distance from the world's origin, in metres, that no point of a moving geometry exceeds at any joint positions.
 
         It adds up the offsets along the chain. A revolute joint turns about its frame's origin, and a prismatic joint moves its child by
-        at most its greatest position.
+        at most its greatest position times its speed.
         """
         distance = {body: float(np.linalg.norm(X[:3, 3])) for body, X in self.anchored.items()}
         for j in self.joints:
             if j.child not in distance:
-                slide = max(abs(j.lower or 0.0), abs(j.upper or 0.0)) if j.kind is JointKind.PRISMATIC else 0.0
+                slide = max(abs(j.lower or 0.0), abs(j.upper or 0.0)) * j.speed if j.kind is JointKind.PRISMATIC else 0.0
                 offsets = np.linalg.norm(j.X_PF[:3, 3]) + slide + np.linalg.norm(j.X_BM[:3, 3])
                 distance[j.child] = distance[j.parent] + float(offsets)
         return max(

@@ -9,7 +9,7 @@ from pydrake.geometry import QueryObject
 
 from certifier.errors import RegionError
 from certifier.model import Array, Pair, Scene
-from certifier.scene.drake_model import build_diagram, geometry_name, in_drake
+from certifier.scene.drake_model import InDrake, build_diagram, geometry_name
 from certifier.scene.hollow import beyond, remedy, standing_for
 
 SHELLS, EACH = np.geomspace(0.004, 1.0, 12), 40
@@ -26,7 +26,7 @@ class Clearance:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._diagram = build_diagram(scene)
-        self._own = in_drake(scene, self._diagram.plant())
+        self._own = InDrake(scene, self._diagram.plant())
         self._context = self._diagram.CreateDefaultContext()
         inspector = self._diagram.scene_graph().model_inspector()
         self._ids = {geometry_name(inspector, g): g for g in inspector.GetAllGeometryIds()}
@@ -57,7 +57,7 @@ class Clearance:
         return all(pair.distance > self._reaches[frozenset((pair.id_A, pair.id_B))] + room for pair in near)
 
     def _query(self, q: Array) -> QueryObject:
-        self._diagram.plant().SetPositions(self._diagram.mutable_plant_context(self._context), q[self._own])
+        self._diagram.plant().SetPositions(self._diagram.mutable_plant_context(self._context), self._own.at(q))
         found: QueryObject = (
             self._diagram.scene_graph().get_query_output_port().Eval(self._diagram.mutable_scene_graph_context(self._context))
         )

@@ -34,10 +34,8 @@ def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> Nearest:
     """
     q = np.asarray(q, dtype=float)
     if q.shape != (scene.n,):
-        names = ", ".join(joint.name for joint in scene.moving)
-        raise RegionError(
-            "seed_wrong_length", f"it has {q.size} numbers, the scene {scene.n} joints", field=field, hint=f"in order: {names}"
-        )
+        message = f"it has {q.size} numbers, the scene {scene.n} joints"
+        raise RegionError("seed_wrong_length", message, field=field, hint=scene.in_order)
     check_limits(scene, q, field)
     return check_free(scene, q, field)
 

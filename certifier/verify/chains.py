@@ -1,7 +1,8 @@
 """Chains of joints are evaluated here at many configurations, in doubles, with a bound of the error. docs/algorithm.md, 11, has the bounds.
 
 Let u = 2^-53, let Y be a computed number and y what it stands for, and let lengths and the norm that belongs to them measure errors. The
-size of a vertex is the sum of all lengths on the way to it: |v|, that of each of the m + 1 offsets, and that of each slide.
+size of a vertex is the sum of all lengths on the way to it: |v|, that of each of the m + 1 offsets, and that of each slide, its position
+times the length of its axis, which is 2^10 at most.
 
 - An offset or an axis, rounded to doubles, is wrong by at most 2 u of its length, and a rotation by at most 4 u; all by 2^-199 more, as
   certifier.verify.places has it.
@@ -20,9 +21,9 @@ that which is below 2^-9, because certifier.verify.sides ensures that the whole 
 That no two lengths are put together first is what makes this hold where they cancel. What is done with less of them, as n'R'v with the
 length of R v + offset, is wrong by a part of their sum nevertheless.
 
-What a slide is wrong by is added as it is: it moves what is behind it by that. The 2^-199 of offsets and rotations, and the 2^-1074 by
-which products that underflow are wrong, are multiplied by 2^30 m at most and by fewer than 2^14 numbers. The least size is 2^-100 m, a part
-of which is more than that.
+What the position of a slide is wrong by is added, times the length of its axis: it moves what is behind it by that. The 2^-199 of offsets
+and rotations, and the 2^-1074 by which products that underflow are wrong, are multiplied by 2^30 m at most and by fewer than 2^14 numbers.
+The least size is 2^-100 m, a part of which is more than that.
 """
 
 from __future__ import annotations
@@ -59,14 +60,15 @@ class Chain:
 
     Attributes:
         joints: (m,) position indices.
-        slides: (m,) whether each joint is prismatic.
-        axes: (m, 3) unit vectors, reversed for a joint that is crossed from child to parent, each number rounded to a double.
+        speeds: (m,) by how many metres each prismatic joint slides for a metre of its position, rounded upwards; 0 for a revolute joint.
+        axes: (m, 3) unit vectors, or as long as the joint slides fast, reversed for a joint that is crossed from child to parent, each
+            number rounded to a double.
         rotations: (m + 1, 3, 3) of the fixed poses before, between and behind the joints, each number rounded to a double.
         offsets: (m + 1, 3) of the fixed poses, metres, each number rounded to a double.
     """
 
     joints: np.ndarray
-    slides: np.ndarray
+    speeds: Array
     axes: Array
     rotations: Array
     offsets: Array
@@ -90,7 +92,7 @@ def poses(chains: Sequence[Chain], which: np.ndarray, at: np.ndarray, q: Array, 
         q: (T, n) positions, of which those of prismatic joints matter.
         cosines, sines: (T, n) of the positions of revolute joints.
     """
-    joints, slides = (np.concatenate([getattr(chain, name) for chain in chains]) for name in ("joints", "slides"))
+    joints, slides = np.concatenate([chain.joints for chain in chains]), np.concatenate([chain.speeds > 0 for chain in chains])
     axes, rotations, offsets = (np.concatenate([getattr(chain, name) for chain in chains]) for name in ("axes", "rotations", "offsets"))
     skew = np.moveaxis(_skew(axes), -1, 0)
     square = skew @ skew

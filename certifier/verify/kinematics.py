@@ -10,7 +10,8 @@ and the pose of B in A would not be the inverse of the pose of A in B.
 
 So a matrix stands for the rotation of the quaternion that it gives (Shepperd, *Quaternion from rotation matrix*, 1978). An axis stands
 for the unit vector of its stereographic projection. Quaternion and projection are rounded at 2^-ROUNDING_BITS. All poses are therefore
-rational and exactly rigid.
+rational and exactly rigid. The axis of a slide that follows another joint is as long as it slides fast. It is no unit vector, and its
+doubles are taken as they are.
 
 A matrix that is an exact rotation already stands for itself, but for the rounding, and so does an exact unit vector. Any other differs
 from what it stands for by at most ten times what its doubles miss being a rotation, or a unit vector, by. The quaternion's square norm is
@@ -157,15 +158,15 @@ class ExactKinematics:
         of the motion are treated as the same frame.
 
         Returns:
-            the m axes as unit vectors, and m + 1 poses, (4, 4): of the first joint's frame in F, of each further joint's frame in that of
-            the joint before it, and of B in the last joint's.
+            the m axes as :func:`axis_of` has them, and m + 1 poses, (4, 4): of the first joint's frame in F, of each further joint's frame
+            in that of the joint before it, and of B in the last joint's.
         """
         axes, poses, fixed = [], [], _identity()
         for joint, upwards in self.path(frame, body):
             outer, inner = self._fixed_frames(joint, upwards)
             fixed = _multiply(fixed, outer)
             if joint.index is not None:
-                axes.append(tuple(unit(_doubles(joint.axis))))
+                axes.append(tuple(axis_of(joint)))
                 poses.append(fixed)
                 fixed = _identity()
             fixed = _multiply(fixed, inner)
@@ -188,7 +189,7 @@ class ExactKinematics:
         outer, inner = self._fixed_frames(joint, upwards)
         if joint.index is None:
             return outer, None, inner
-        axis = [-x if upwards else x for x in unit(_doubles(joint.axis))]
+        axis = [-x if upwards else x for x in axis_of(joint)]
         s, q = self._s[joint.index], float(self._q_star[joint.index])
         if joint.kind is JointKind.PRISMATIC:
             middle = self._embedded(_identity())
@@ -271,6 +272,18 @@ def unit(doubles: bytes) -> list[fmpq]:
     square = sum((x * x for x in plane), fmpq(0))
     turned = (1 - square) / (1 + square)
     return [(turned if axis[pole] > 0 else -turned) if i == pole else 2 * x / (1 + square) for i, x in enumerate(plane)]
+
+
+def axis_of(joint: Joint) -> list[fmpq]:
+    """Returns the vector that a joint's axis stands for, along which it slides by its position, or about which it turns."""
+    if has_speed(joint):
+        return [exact(x) for x in joint.axis]
+    return unit(_doubles(joint.axis))
+
+
+def has_speed(joint: Joint) -> bool:
+    """Returns whether a joint slides and follows another one: then the length of its axis is its speed. Other axes are unit vectors."""
+    return joint.follows and joint.kind is JointKind.PRISMATIC
 
 
 def _rounded(x: fmpq) -> fmpq:

@@ -19,8 +19,8 @@ from flint import arb, arb_mat, ctx
 
 from certifier.errors import ProofError
 from certifier.model import WORLD, Array, Joint, JointKind, Scene
-from certifier.verify.chains import Chain
-from certifier.verify.kinematics import rigid, unit
+from certifier.verify.chains import Chain, lengths
+from certifier.verify.kinematics import axis_of, has_speed, rigid
 
 BITS = 512
 _SMALL = 2.0**-200
@@ -84,7 +84,7 @@ class Places:
             axes = [sign * self._axis(joint) for joint, sign in crossed]
         return Chain(
             np.array([joint.index for joint, _ in crossed], dtype=np.int64),
-            np.array([joint.kind is JointKind.PRISMATIC for joint, _ in crossed], dtype=bool),
+            np.array([_speed(joint) for joint, _ in crossed]),
             np.array(axes).reshape(-1, 3),
             np.array([R for R, _ in fixed]),
             np.array([p for _, p in fixed]),
@@ -129,9 +129,15 @@ class Places:
 
     def _axis(self, joint: Joint) -> Array:
         if joint.child not in self._axes:
-            exact = unit(np.asarray(joint.axis, dtype=float).tobytes())
-            self._axes[joint.child] = np.array([float(int(x.p) / int(x.q)) for x in exact])
+            self._axes[joint.child] = np.array([float(int(x.p) / int(x.q)) for x in axis_of(joint)])
         return self._axes[joint.child]
+
+
+def _speed(joint: Joint) -> float:
+    """Returns by how many metres a joint slides for a metre of its position, rounded upwards; 0 for one that turns."""
+    if joint.kind is not JointKind.PRISMATIC:
+        return 0.0
+    return float(lengths(joint.axis[None])[0]) if has_speed(joint) else 1.0
 
 
 def _rigid(X: Array) -> _Ball:

@@ -15,7 +15,7 @@ from certifier.errors import ProofError
 from certifier.model import WORLD, Joint, JointKind, Scene
 from certifier.names import escaped, is_name, is_sentence
 from certifier.proof import limits
-from certifier.verify.kinematics import ExactKinematics
+from certifier.verify.kinematics import ExactKinematics, has_speed
 
 RIGID = 1e-9
 """The numbers of a rotation or of an axis may be this far from orthonormal; those of a parsed model are within about 1e-16."""
@@ -39,7 +39,13 @@ def check_scene(scene: Scene) -> None:
 
 def following(scene: Scene) -> list[str]:
     """Returns a line for each joint that follows another one."""
-    return [f"  '{joint.name}' moves with '{scene.moving[joint.index or 0].name}'" for joint in scene.following]
+    return [f"  '{joint.name}' moves with '{scene.moving[joint.index or 0].name}'{_how_far(joint)}" for joint in scene.following]
+
+
+def _how_far(joint: Joint) -> str:
+    """Returns how far a joint moves for a change of its position, to nine digits; "" for just as far."""
+    length = float(np.linalg.norm(joint.axis))
+    return f", {length:.9g} times as far" if has_speed(joint) and f"{length:.9g}" != "1" else ""
 
 
 def _require(condition: Any, problem: str) -> None:
@@ -120,7 +126,8 @@ def _check_joint(scene: Scene, joint: Joint) -> None:
     _require((joint.index is None) == (joint.kind is JointKind.WELD), f"the kind of {joint.name}")
     if joint.index is None:
         return
-    _require(joint.axis.shape == (3,) and abs(np.linalg.norm(joint.axis) - 1) < RIGID, f"the axis of {joint.name}")
+    least, most = limits.SPEEDS if has_speed(joint) else (1 - RIGID, 1 + RIGID)
+    _require(joint.axis.shape == (3,) and least <= np.linalg.norm(joint.axis) <= most, f"the axis of {joint.name}")
     _require(_finite(joint.lower, joint.upper), f"the limits of {joint.name}")
     lower, upper = np.array([joint.lower, joint.upper], dtype=float)
     _require(lower < upper, f"the limits of {joint.name}")

@@ -26,9 +26,10 @@ class Sides(NamedTuple):
         ways: (S,) number of each side's chain, as :class:`Known` counts them.
         geometries: (S,) number of the geometry.
         radii: (S,) metres.
-        moving, sliding: (S,) how many joints there are, and how many of them are prismatic.
+        moving: (S,) how many joints there are.
         joints: (S, M) position indices; 0 where there is no joint.
-        turns, slides: (S, M) whether there is a revolute joint, and whether there is a prismatic one.
+        turns: (S, M) whether there is a revolute joint.
+        speeds: (S, M) by how many metres a prismatic joint slides for a metre of its position, rounded upwards; 0 where there is none.
         before: (S, M) lengths of the fixed poses before the joints, metres, rounded upwards.
         aside: (S, M) how far the pose behind each joint leads from its axis, rounded upwards; 0 for the last joint.
         tail, from_axis, size: (S,) how far the vertices are from the last joint and from its axis, and the sum of all lengths on the way
@@ -39,10 +40,9 @@ class Sides(NamedTuple):
     geometries: np.ndarray
     radii: Array
     moving: np.ndarray
-    sliding: np.ndarray
     joints: np.ndarray
     turns: np.ndarray
-    slides: np.ndarray
+    speeds: Array
     before: Array
     aside: Array
     tail: Array
@@ -54,8 +54,9 @@ class Sides(NamedTuple):
         return Sides(*(array[which] for array in self))
 
     def slid(self, reaches: Array) -> Array:
-        """Returns how far the prismatic joints of K sides are from 0 at most, (K, M), where those of the scene are (K, n)."""
-        return np.where(self.slides, np.take_along_axis(reaches, self.joints, axis=1), 0.0)
+        """Returns how far the prismatic joints of K sides slide from 0 at most, (K, M) metres, where the positions are (K, n) from it."""
+        found: Array = self.speeds * np.take_along_axis(reaches, self.joints, axis=1) * UP
+        return found
 
     def levers(self, slid: Array) -> Array:
         """Returns how far vertices can be from the joints' axes, in metres, rounded upwards.
@@ -66,8 +67,8 @@ class Sides(NamedTuple):
             slid: (K, M) as from :meth:`slid`, for K sides.
 
         Returns:
-            (K, M) distances from the axes, 1 for a prismatic joint, 0 where there is none. A change of one position moves no vertex farther
-            than by the joint's lever times the change.
+            (K, M) distances from the axes, the speed of a prismatic joint, 0 where there is none. A change of one position moves no vertex
+            farther than by the joint's lever times the change.
         """
         levers = np.zeros_like(slid)
         levers[:, -1:] = self.from_axis[:, None]
@@ -75,7 +76,7 @@ class Sides(NamedTuple):
         behind = np.cumsum((slid + self.before)[:, :0:-1], axis=1)[:, ::-1]
         levers[:, :-1] = self.aside[:, :-1] + slid[:, 1:] + self.tail[:, None]
         levers[:, :-2] += behind[:, 1:]
-        return np.where(self.turns, levers * UP, np.where(self.slides, 1.0, 0.0))
+        return np.where(self.turns, levers * UP, self.speeds)
 
     def sizes(self, slid: Array) -> Array:
         """Returns the sum of all lengths on the way to the farthest vertices, (K,) metres, rounded upwards: what rounding is a part of.
@@ -98,7 +99,7 @@ class Sides(NamedTuple):
         part = (self.moving + 3) * (2.0**-44 + 2 * inexact)
         if not (part < 2.0**-10).all():
             raise ProofError("proof_too_large", "the positions of the motion are too large for doubles to tell where the bodies are")
-        return sizes * part + self.sliding * inexact
+        return sizes * part + self.speeds.sum(axis=1) * UP * inexact
 
     def accelerations(self, levers: Array, rates: Array, changes: Array) -> Array:
         """Returns bounds of the accelerations of all vertices, (K,), from levers (K, M), rates and changes (K, n), rounded upwards.
@@ -184,10 +185,9 @@ def _side(way: int, geometry: int, radius: float, chain: Chain, vertices: Array)
         geometries=np.array([geometry]),
         radii=np.array([radius]),
         moving=np.array([m]),
-        sliding=chain.slides.sum(keepdims=True),
         joints=chain.joints[None],
-        turns=~chain.slides[None],
-        slides=chain.slides[None],
+        turns=chain.speeds[None] == 0,
+        speeds=chain.speeds[None],
         before=fixed[None, :-1],
         aside=aside,
         tail=np.array([reach.tail]),

@@ -44,10 +44,11 @@ class Frame(NamedTuple):
     Attributes:
         turns: (m + 1, 4) quaternions of the fixed poses.
         offsets: (m + 1, 3) of the fixed poses, metres.
-        axes: (m, 3) unit vectors.
+        axes: (m, 3), as certifier.motion.chains.Chain has them.
         joints: (m,) position indices, from the world on.
         slides: (m,) whether each joint is prismatic.
-        levers: (m,) how far the frame's origin moves at most where the joint moves by 1: metres, and 1 for a prismatic joint.
+        levers: (m,) how far the frame's origin moves at most where the joint moves by 1: metres, or the length of the axis of a
+            prismatic joint.
         lower, upper: (n,) the joints' own limits, radians or metres.
         size: metres, about the length of the arm; never 0.
     """
@@ -81,10 +82,10 @@ def frame_of(scene: Scene, name: str) -> Frame:
     farthest = np.where(scene.revolute, 0.0, np.maximum(np.abs(lower), np.abs(upper)))
     levers = np.empty(len(found.joints))
     measured = lengths(found, np.zeros((1, 3)))
-    chained = found.joints, found.slides, measured.offsets, measured.across, measured.tail, measured.tail_across
+    chained = found.joints, found.speeds, measured.offsets, measured.across, measured.tail, measured.tail_across
     size = measured.size + fill_levers(*chained, farthest, levers)
     turns = np.array([_quaternion(R) for R in found.rotations])
-    return Frame(turns, found.offsets, found.axes, found.joints, found.slides, levers, lower, upper, size or 1.0)
+    return Frame(turns, found.offsets, found.axes, found.joints, found.speeds > 0.0, levers, lower, upper, size or 1.0)
 
 
 def pose_of(position: ArrayLike, rpy: ArrayLike) -> Pose:

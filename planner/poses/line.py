@@ -10,7 +10,7 @@ of the two. Let D bound its third derivative. Taylor's theorem about t = 1/2 for
 - Position. p is linear, so d'' is the second derivative of the frame's origin x; it is computed at t = 1/2 from the joints' axes a. The
   third derivative of x by joints j, k, l, in the order from the world on, is a_j x (a_k x dx/dq_l), and |dx/dq_l| is at most the lever of l
   (certifier.motion.chains). Let T_l be the sum of |dq_k| over the revolute joints k up to l. A revolute joint l adds
-  lever_l (T_l^3 - T_(l-1)^3) to D, and a prismatic one 3 T_(l-1)^2 |dq_l|.
+  lever_l (T_l^3 - T_(l-1)^3) to D, and a prismatic one 3 T_(l-1)^2 lever_l |dq_l|.
 - Rotation. The frame's quaternion y is a product with one factor for each joint, and each derivative of it by a joint's angle is half a
   unit quaternion. So its third derivative is at most (T/2)^3, where T is the sum over all joints. Let v be the sum of dq_k a_k, and b that
   of dq_j dq_k (a_j x a_k) over j < k; then y'' = (b/2 - |v|^2/4) y. For an angle w between the waypoints, z'' = -(w/2)^2 z, and the third
@@ -226,7 +226,7 @@ def deviation(arm: Frame, a: Array, b: Array, first: Pose, middle: Pose, last: P
         rate, u = b[arm.joints[k]] - a[arm.joints[k]], axes[k]
         if arm.slides[k]:
             bent += 2.0 * rate * np.cross(rotating, u)
-            jerk += 3.0 * turning**2 * abs(rate)
+            jerk += 3.0 * turning**2 * arm.levers[k] * abs(rate)
         else:
             moved = rate * np.cross(u, pose.position - origins[k])
             bent += np.cross(2.0 * rotating + rate * u, moved)

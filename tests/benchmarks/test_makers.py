@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from benchmarks import commands, makers, report
+from benchmarks.__main__ import FAILED, OK, main
 from certifier.errors import CirisError
 from certifier.jobs.motion import certify
 from certifier.motion.given import given
@@ -90,6 +91,9 @@ def test_a_step_that_fails_says_why_and_the_other_arms_go_on(monkeypatch: pytest
     cells = ["three", "6", "40", "3", "2.0", "0.250 after 5 s", "0.500", "3.0", "0.12", "2.50", "9 of 10", "8 of 10"]
     (line,) = [line.split("|") for line in text.splitlines() if line.startswith("| three")]
     assert [cell.strip() for cell in line if cell.strip() in cells] == cells
+    for names, status in ((["one", "three"], FAILED), (["three"], OK)):
+        monkeypatch.setattr(sys, "argv", ["bench", "arms", *names, "--json"])
+        assert main() == status
     with pytest.raises(CirisError, match="there is no arm 'r2d2'"):
         makers.arms(["one", "r2d2"], 20.0, 10, QUIET)
 

@@ -123,6 +123,21 @@ def random_tree(seed, kinds=(JointKind.REVOLUTE, JointKind.PRISMATIC, JointKind.
     return Scene("tree", tuple(joints), tuple(names), (), (), (), rng.uniform(-0.5, 0.5, position))
 
 
+def slides_together(tree, seed):
+    """The same tree, whose slides all follow the first one, slower or faster than it, and some the other way round."""
+    rng, moving, joints = np.random.default_rng(seed), [joint for joint in tree.joints if joint.index is not None], []
+    slides = [joint for joint in moving if joint.kind is JointKind.PRISMATIC]
+    number = {joint.name: i for i, joint in enumerate(joint for joint in moving if joint not in slides[1:])}
+    for joint in tree.joints:
+        if joint in slides[1:]:
+            speed = rng.choice([-1, 1]) * 10 ** rng.uniform(-1.3, 1.3)
+            joint = replace(joint, axis=speed * joint.axis, index=number[slides[0].name], follows=True)
+        elif joint.index is not None:
+            joint = replace(joint, index=number[joint.name])
+        joints.append(joint)
+    return replace(tree, joints=tuple(joints), q_star=tree.q_star[: len(number)])
+
+
 def crowded(count=1000):
     """Returns the arm of one link, with ``count`` balls welded to the link and ``count`` balls welded to the world."""
     scene = planar_arm(1)

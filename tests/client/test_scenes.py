@@ -149,6 +149,11 @@ def test_a_second_scene_of_a_directory_has_a_seed_of_its_own(ciris: Ciris, tmp_p
     (tmp_path / "other.seed.yaml").write_text("q: [0, 0]\n")
     assert "other.seed.yaml" in ciris("scene", "check", "other.yaml").error
     assert "nothing touches at seed.yaml" in ciris("scene", "check", "scene.yaml").stdout
+    (tmp_path / "other.seed.yaml").write_text("q: [0, 0]\n")
+    assert "other.seed.yaml: q: it has 2 numbers, the scene 1 joints" in ciris("grow", "other.yaml", "--local").error
+    (tmp_path / "other.seed.yaml").write_text("q: [1e9]\n")
+    assert "other.seed.yaml: q[0]: 1000000000.0 is no number of at most 1e+06" in ciris("grow", "other.yaml", "--local").error
+    assert "--q: it has 2 numbers" in ciris("grow", "other.yaml", "--q", "0,0", "--local").error
     (tmp_path / "other.seed.yaml").unlink()
     assert "put q into other.seed.yaml" in ciris("grow", "other.yaml", "--local").error
 

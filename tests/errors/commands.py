@@ -95,7 +95,7 @@ COMMANDS: Table = {
     ("bad_number", "--q[1]"): [lambda t: grow(t, "--q", "0,x")],
     ("bad_number", "--q"): [lambda t: grow(t, "--q", ",")],
     ("seed_missing", "--q"): [lambda t: t.ciris("grow", t.write(alone__yaml="").name, "--local")],
-    ("seed_file", "--q"): [lambda t: beside_a_seed(t, "q: [here]")],
+    ("seed_file", "seed.yaml"): [lambda t: beside_a_seed(t, "q: [here]")],
     ("polytope_joints", "--polytope"): [lambda t: good(t, "--local", space={"joints": ["other/a", "other/b"]})],
     ("polytope_q_star", "--polytope"): [bound],
     ("polytope_file", "--polytope"): [

@@ -7,7 +7,7 @@ from pathlib import Path
 from certifier.jobs.reference import Reference
 from certifier.scene import load_scene
 from certifier.scene.draft import draft
-from tests.certifier.scene.workshop import SCENE
+from tests.certifier.scene.workshop import LIMIT, SCENE
 from tests.errors.trial import Table, Trial
 
 D = "directives: [{add_model: {name: a, file: a.urdf}}]\n"
@@ -164,7 +164,14 @@ SCENES: Table = {
     ],
     ("scene_field", "limits.arm/turn"): [lambda t: t.scene(extra="limits: {turn: [-2, 1]}")],
     ("no_joints", "directives"): [lambda t: t.scene(extra="fix: {turn: 0}")],
-    ("scene_field", "q_star"): [lambda t: t.scene(extra="q_star: [0, 0]")],
+    ("unknown_name", "limits.follow"): [lambda t: t.scene(more=BESIDE, extra=f"{APART}\nlimits: {{follow: [0, 1]}}")],
+    ("unknown_name", "configurations.open.follow"): [
+        lambda t: t.scene(more=BESIDE, extra=f"{APART}\nconfigurations: {{open: {{follow: 0}}}}")
+    ],
+    ("scene_field", "q_star"): [
+        lambda t: t.scene(extra="q_star: [0, 0]"),
+        lambda t: t.scene(more=BESIDE, extra=f"{APART}\nq_star: [0, 0]"),
+    ],
     ("joint_range", "directives"): [
         lambda t: t.scene(more=MIMIC.replace("<mimic ", '<mimic offset="9" ')),
         lambda t: t.scene(limit='<limit lower="1" upper="1" effort="1" velocity="1"/>'),
@@ -188,7 +195,9 @@ SCENES: Table = {
         lambda t: t.scene(more=MIMIC),
         lambda t: t.scene(more=MIMIC.replace("<mimic ", '<mimic multiplier="2" ')),
         lambda t: t.scene(more=MIMIC.replace("revolute", "prismatic")),
+        lambda t: t.scene(kind="prismatic", more=MIMIC.replace("revolute", "prismatic").replace("<mimic ", '<mimic multiplier="2000" ')),
         lambda t: t.scene(more=BESIDE),
+        lambda t: t.scene(more=BESIDE, extra=APART, limit=f'{LIMIT}<mimic joint="follow"/>'),
     ],
     ("unsupported_joint", ""): [lambda t: Reference(t.scene(more=BESIDE, extra=APART))],
     ("scene_field", "fix"): [

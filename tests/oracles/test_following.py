@@ -15,6 +15,7 @@ from pydrake.geometry import SceneGraph
 
 from certifier.errors import ProofError, SceneError
 from certifier.growth.options import GrowthOptions
+from certifier.jobs.local import certify as certify_box
 from certifier.jobs.local import grow
 from certifier.jobs.motion import certify
 from certifier.kinematics import Kinematics
@@ -41,6 +42,8 @@ from tests.oracles.trees import random_plant
 HANDS = {
     "panda": (jaws("prismatic", 1, 0.0), {"arm/other": ("arm/grip", 1, 0.0)}),
     "slides": (jaws("prismatic", -1, 0.07), {"arm/other": ("arm/grip", -1, 0.07)}),
+    "slower": (jaws("prismatic", 0.3, -0.05), {"arm/other": ("arm/grip", 0.3, -0.05)}),
+    "faster": (jaws("prismatic", -2.5, 0.07), {"arm/other": ("arm/grip", -2.5, 0.07)}),
     "turns": (jaws("revolute", 1, 0.3), {"arm/other": ("arm/grip", 1, 0.3)}),
     "mirrored": (jaws("revolute", -1, -0.7), {"arm/other": ("arm/grip", -1, -0.7)}),
     "whole turns": (
@@ -142,7 +145,7 @@ def coupled(rng, moving):
             other, scale, factor, offset = (
                 before[rng.integers(len(before))],
                 rng.choice([1.0, -1.0, 2.0]),
-                rng.choice([-1, 1]),
+                rng.choice([-1, 1]) * (10 ** rng.uniform(-0.7, 0.7) if joint.kind is JointKind.PRISMATIC else 1.0),
                 rng.normal() / 8,
             )
             found.append(Coupling({other.name: -scale * factor, joint.name: scale}, scale * offset))
@@ -163,7 +166,7 @@ def solved(at, couplings, leaders):
     return known
 
 
-@pytest.mark.parametrize(("factor", "offset"), [(1, 0.0), (-1, 0.07)])
+@pytest.mark.parametrize(("factor", "offset"), [(1, 0.0), (-1, 0.07), (0.5, 0.0), (-3, 0.1)])
 def test_two_fingers_that_slide_are_one_factor_of_degree_1(tmp_path, factor, offset):
     path = write(tmp_path, more=jaws("prismatic", factor, offset))
     scene, rng = parsed(path), np.random.default_rng(0)
@@ -187,11 +190,12 @@ def test_two_fingers_that_slide_are_one_factor_of_degree_1(tmp_path, factor, off
     assert Kinematics.of(scene).frames(*fingers) == list(fingers)
 
 
-def test_a_motion_is_proved_to_where_a_finger_meets_the_post_or_the_other_finger(tmp_path):
-    """The pad's outside is at y = -0.03 - grip, and the post begins at -0.08."""
-    path, scene = gripper(tmp_path, -0.09)
-    drake = Original(path, {"arm/other": ("arm/grip", 1, 0.0)})
-    for end, proved in ((0.049, True), (0.06, False)):
+@pytest.mark.parametrize(("factor", "at"), [(1, -0.09), (0.5, -0.07), (-2, -0.13)])
+def test_a_motion_is_proved_to_where_a_finger_meets_the_post_or_the_other_finger(tmp_path, factor, at):
+    """The pad's outside is at y = -0.03 - |factor| grip, and the post begins at ``at`` + 0.01."""
+    path, scene = gripper(tmp_path, at, factor)
+    drake, meets = Original(path, {"arm/other": ("arm/grip", factor, 0.0)}), (-0.04 - at) / abs(factor)
+    for end, proved in ((0.98 * meets, True), (1.2 * meets, False)):
         motion = Motion(Space.Q, np.array([[0.0, 0.0], [0.0, end]]))
         verdict = certify(scene, motion)
         assert (verdict.outcome is Outcome.CERTIFIED) is proved
@@ -199,36 +203,52 @@ def test_a_motion_is_proved_to_where_a_finger_meets_the_post_or_the_other_finger
         assert bool(drake.touching(scene)) is not proved
     closing = certify(scene, Motion(Space.Q, np.array([[0.0, 0.01], [0.0, -0.02]])))
     assert closing.stop.pair == scene.pairs[0]
-    assert 0.01 - 0.03 * closing.stop.time == pytest.approx(-0.01, abs=1e-3)
-    assert closing.statement.end < 2 / 3
+    assert 0.01 - 0.03 * closing.stop.time == pytest.approx(-0.02 / (1 + abs(factor)), abs=1e-3)
+    assert closing.statement.end < (0.01 + 0.02 / (1 + abs(factor))) / 0.03
     assert verdict.stop is not None
-    assert 0.06 * verdict.stop.time == pytest.approx(0.05, abs=1e-3)
-    assert "  'arm/other' moves with 'arm/grip'" in certify(scene, Motion(Space.Q, np.array([[0.0, 0.0], [0.0, 0.03]]))).statement.lines()
+    assert 1.2 * meets * verdict.stop.time == pytest.approx(meets, abs=1e-3)
+    lines = certify(scene, Motion(Space.Q, np.array([[0.0, 0.0], [0.0, 0.6 * meets]]))).statement.lines()
+    assert f"  'arm/other' moves with 'arm/grip'{'' if factor == 1 else f', {abs(factor)} times as far'}" in lines
 
 
-def test_a_region_whose_fingers_move_is_free_and_the_post_is_found(tmp_path):
-    """One finger reaches y = -0.12, and a post stands at y = -0.09. The fingers can also touch each other. Drake finds no contact in the
-    region, and finds both contacts outside of it.
+@pytest.mark.parametrize(("factor", "at"), [(1, -0.09), (0.5, -0.07), (-2, -0.13)])
+def test_a_box_is_certified_nearly_up_to_the_post_and_not_beyond(tmp_path, factor, at):
+    _, scene = gripper(tmp_path, at, factor)
+    meets, post = (-0.04 - at) / abs(factor), scene.pairs.index(Pair("arm/other_link/pad", "room/walls/post"))
+    for part, outcomes in ((0.97, {Outcome.CERTIFIED}), (1.03, {Outcome.REFUTED})):
+        upper, lower = (scene.to_s(np.array(q)) for q in ((0.01, part * meets), (-0.01, 0.0)))
+        box = Polytope(np.concatenate([np.eye(2), -np.eye(2)]), np.concatenate([upper, -lower]))
+        verdict = certify_box(scene, box, assemble=True)
+        assert {verdict.results[post].outcome} == outcomes
+        assert (verdict.region is not None) == (part < 1)
+        assert verdict.region is None or verify_region(verdict.region.proof)
+
+
+@pytest.mark.parametrize(("factor", "at"), [(1, -0.09), (0.5, -0.07), (-2, -0.13)])
+def test_a_region_whose_fingers_move_is_free_and_the_post_is_found(tmp_path, factor, at):
+    """One finger reaches the post, which stands at y = ``at``. The fingers can also touch each other. Drake finds no contact in the region,
+    and finds both contacts outside of it.
     """
-    path, scene = gripper(tmp_path, -0.09)
-    drake, post = Original(path, {"arm/other": ("arm/grip", 1, 0.0)}), Pair("arm/other_link/pad", "room/walls/post")
+    path, scene = gripper(tmp_path, at, factor)
+    drake, post = Original(path, {"arm/other": ("arm/grip", factor, 0.0)}), Pair("arm/other_link/pad", "room/walls/post")
     assert scene.pairs == (Pair("arm/grip_link/pad", "arm/other_link/pad"), Pair("arm/grip_link/pad", "room/walls/post"), post)
     everywhere = scene.polytope(np.zeros((0, 2)), np.zeros(0))
 
     def hits(polytope: Polytope, count: int) -> int:
-        found = 0
-        for q in scene.to_q(hit_and_run(polytope, chebyshev_center(polytope)[0], count, 0)):
+        every, found = scene.to_q(hit_and_run(polytope, chebyshev_center(polytope)[0], count, 0)), []
+        for q in every:
             drake.place(scene, q)
-            found += bool(drake.touching(scene))
-        return found
+            found.append(drake.touching(scene))
+        assert found[:1000] == list(touching(scene, every[:1000]))
+        return sum(map(bool, found))
 
     region = grow(scene, GrowthOptions(seed={"q": [0.0, 0.01]}))
     grown = Polytope(np.array(region.manifest["halfspace_normals"]), np.array(region.manifest["halfspace_offsets"]))
     assert hits(grown, 10_000) == 0
     assert hits(everywhere, 1000) > 50
-    for q, pair in (([0.0, 0.07], post), ([0.0, -0.015], scene.pairs[0])):
+    for q, pair in (([0.0, (-0.04 - at) / abs(factor) + 0.005], post), ([0.0, -0.0175], scene.pairs[0])):
         assert not grown.contains(scene.to_s(np.array(q)))
         drake.place(scene, np.array(q))
         assert drake.touching(scene) == {pair}
     lines = verify_region(region.proof).lines()
-    assert "  'arm/other' moves with 'arm/grip'" in lines
+    assert f"  'arm/other' moves with 'arm/grip'{'' if factor == 1 else f', {abs(factor)} times as far'}" in lines

@@ -68,16 +68,18 @@ def our_pose(scene: Scene, q: np.ndarray, frame: str, body: str) -> np.ndarray:
     return X / X[3, 3]
 
 
-def gripper(tmp_path: Path, at: float) -> tuple[Path, Scene]:
+def gripper(tmp_path: Path, at: float, factor: float = 1.0) -> tuple[Path, Scene]:
     """A hand that turns, with fingers that open to both sides, and a post beside the second finger, which follows.
 
-    The fingers overlap where grip is less than -0.01.
+    It moves ``factor`` times as far. The fingers overlap where grip is less than -0.02 / (1 + |factor|).
     """
+    first, last = sorted((-0.02 * factor, 0.1 * factor))
     pad = '<link name="{0}"><collision name="pad"><geometry><box size="0.02 0.02 0.1"/></geometry></collision></link>'
     joint = """<joint name="{0}" type="prismatic"><parent link="hand"/><child link="{0}_link"/><origin xyz="0 {1} 0.15"/>
-      <axis xyz="0 {2} 0"/><limit lower="-0.02" upper="0.1" effort="1" velocity="1"/>{3}</joint>"""
+      <axis xyz="0 {2} 0"/><limit lower="{3}" upper="{4}" effort="1" velocity="1"/>{5}</joint>"""
     fingers = pad.format("grip_link") + pad.format("other_link")
-    fingers += joint.format("grip", 0.02, 1, "") + joint.format("other", -0.02, -1, mimic("grip", 1.0))
+    fingers += joint.format("grip", 0.02, 1, -0.02, 0.1, "")
+    fingers += joint.format("other", -0.02, -np.sign(factor), first, last, mimic("grip", factor))
     arm = f"""<robot name="arm"><link name="base"/><joint name="turn" type="revolute"><parent link="base"/><child link="hand"/>
       <axis xyz="0 0 1"/><limit lower="-0.5" upper="0.5" effort="1" velocity="1"/></joint>
       <link name="hand"><collision name="palm"><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>{fingers}</robot>"""

@@ -3,23 +3,35 @@
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
 from flint import fmpq
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
 from api.drawing import model
 from certifier.errors import ProofError, SceneError
 from certifier.jobs.reference import Reference
-from certifier.model import JointKind, Pair, Scene
+from certifier.kinematics import Kinematics
+from certifier.model import Joint, JointKind, Pair, Scene
+from certifier.motion.search import search
+from certifier.proof.motion import Motion, Space
+from certifier.scene.following import followers_of, leading
+from certifier.scene.joints import Coupling
+from certifier.scene.tree import Tree
 from certifier.seeding.options import Method, SeedOptions
 from certifier.seeding.propose import propose
 from certifier.verify.kinematics import ExactKinematics, exact
+from certifier.verify.motion import verify_motion
 from certifier.verify.scene import check_scene
 from certifier.verify.uncovered import Why, document
 from tests.certifier.scene.hands import IGNORED, gripper, jaws
-from tests.certifier.scene.test_sweep import knuckles, slides
+from tests.certifier.scene.test_sweep import knuckles, mimic
 from tests.certifier.scene.workshop import LIMIT, SCENE, parsed, write
 
 WRIST = jaws("prismatic", 1, 0.0).replace(
@@ -44,16 +56,24 @@ def test_limits_are_those_at_which_all_are_within_theirs(tmp_path):
 @pytest.mark.parametrize(
     ("more", "extra", "code", "words"),
     [
-        (slides("box"), "", "unsupported_joint", "arm/grip and arm/other are coupled (mimic) with the multiplier 1.5"),
+        (jaws("prismatic", 1001, 0.0, own=(-9e5, 9e5)), "", "unsupported_joint", "with the multiplier 1001; in ciris, joints that slide"),
+        (
+            jaws("prismatic", -9e-4, 0.0),
+            "",
+            "unsupported_joint",
+            "multiplier -0.0009; in ciris, joints that slide move",
+        ),
         (jaws("revolute", 2, 0.0), IGNORED, "unsupported_joint", "with the multiplier 2"),
         (jaws("prismatic", 1, 0.0).replace("prismatic", "revolute", 1), IGNORED, "unsupported_joint", "one slides and the other turns"),
         (jaws("revolute", 1, 0.0), "", "unsupported_joint", "both are between arm/grip_link/pad and arm/other_link/pad"),
         (WRIST, "", "unsupported_joint", "both are between arm/grip_link/pad and arm/other_link/pad"),
         (knuckles("box"), "", "unsupported_joint", "one is behind the other"),
         (jaws("prismatic", 1, 3.0), IGNORED, "joint_range", "no range of positions with both within their limits"),
-        (jaws("prismatic", 1, 0.0), IGNORED + "limits: {other: [0, 0.1]}\n", "unknown_name", "no joint of the scene that can move"),
-        (jaws("prismatic", 1, 0.0), IGNORED + "configurations: {open: {other: 0.1}}\n", "unknown_name", "no joint of the scene"),
+        (jaws("prismatic", 1, 0.0), IGNORED + "limits: {other: [0, 0.1]}\n", "unknown_name", "arm/other follows arm/grip (mimic)"),
+        (jaws("prismatic", 1, 0.0), IGNORED + "configurations: {open: {other: 0.1}}\n", "unknown_name", "arm/other follows arm/grip"),
         (jaws("prismatic", 1, 0.0), IGNORED + "limits: {grip: [0, 3]}\n", "scene_field", "own limits"),
+        (jaws("prismatic", 1, 0.0), IGNORED + "q_star: [0, 0, 0]\n", "scene_field", "has 3 numbers for 2 joints"),
+        (jaws("prismatic", 1, 0.0), IGNORED + "configurations: {open: [0, 0, 0]}\n", "scene_field", "has 3 numbers for 2 joints"),
     ],
 )
 def test_what_cannot_move_together_is_refused_with_what_to_do(tmp_path, more, extra, code, words):
@@ -62,9 +82,61 @@ def test_what_cannot_move_together_is_refused_with_what_to_do(tmp_path, more, ex
     assert caught.value.code == code
     assert words in caught.value.message
     assert caught.value.hint
+    if "3 numbers" in words:
+        assert caught.value.hint == "in order: arm/turn, arm/grip; arm/other follows arm/grip"
+    if code == "unknown_name":
+        assert caught.value.hint == "name arm/grip, which takes it along"
 
 
-@pytest.mark.parametrize("factor", [1, -1])
+@pytest.mark.parametrize(
+    ("own", "hint"),
+    [
+        ((3.0, 4.0), "they can be held nowhere either: mend the limits, the multiplier or the offset in the model"),
+        ((0.2, 4.0), "hold them at the only position, by fix: {arm/grip: 0.4}; or mend the limits"),
+        ((0.25, 0.25), "hold them at the only position, by fix: {arm/grip: 0.3}; or mend the limits"),
+    ],
+)
+def test_where_joints_have_no_range_together_the_hint_says_what_helps(tmp_path, own, hint):
+    """The follower is at 0.5 grip + 0.1 or, for the second one, at 0.5 grip, and the grip is within -0.3 and 0.4."""
+    more = jaws("prismatic", 0.5, 0.0 if own == (0.2, 4.0) else 0.1, own=own)
+    with pytest.raises(SceneError) as caught:
+        parsed(write(tmp_path, more=more, extra=IGNORED))
+    assert caught.value.code == "joint_range"
+    assert hint in caught.value.hint
+    if fix := re.search(r"fix: {[^}]*}", caught.value.hint):
+        parsed(write(tmp_path, more=more, extra=f"{IGNORED}{fix[0]}\n"))
+
+
+def test_joints_that_follow_each_other_in_a_circle_are_said_to(tmp_path):
+    more = jaws("prismatic", 0.5, 0.0).replace("</joint>", mimic("other", 2.0) + "</joint>", 1)
+    with pytest.raises(SceneError, match="arm/grip and arm/other follow each other in a circle") as caught:
+        parsed(write(tmp_path, more=more))
+    assert caught.value.hint.startswith("remove one of their mimic elements")
+    parsed(write(tmp_path, more=more, extra="fix: {grip: 0.1}\n"))
+
+
+def test_a_joint_that_follows_with_the_multiplier_0_is_held_and_named(tmp_path):
+    scene = parsed(write(tmp_path, more=jaws("prismatic", 0, 0.25)))
+    assert [joint.name for joint in scene.moving] == ["arm/turn", "arm/grip"]
+    assert not scene.following
+    (held,) = [joint for joint in scene.joints if joint.name == "arm/other"]
+    assert held.kind is JointKind.WELD
+    assert "joint arm/other has the multiplier 0 (mimic), so it never moves: it is held at 0.25" in scene.warnings
+
+
+@pytest.mark.parametrize(
+    ("kind", "factor", "offset", "said"),
+    [
+        ("prismatic", -0.5, 0.07, "arm/other (at -0.5 times its position plus 0.07)"),
+        ("revolute", 1, -0.2, "arm/other (at its position minus 0.2)"),
+    ],
+)
+def test_warnings_say_where_a_follower_is(tmp_path, kind, factor, offset, said):
+    scene = parsed(write(tmp_path, more=jaws(kind, factor, offset), extra=IGNORED))
+    assert any(f"joint arm/grip takes {said} with it: one coordinate" in warning for warning in scene.warnings)
+
+
+@pytest.mark.parametrize("factor", [1, -1, 0.5, -2])
 def test_the_coordinate_has_the_name_of_the_joint_that_is_followed_wherever_it_stands(tmp_path, factor):
     first, second = jaws("prismatic", factor, 0.05).split('<joint name="other"')
     scene = parsed(write(tmp_path, more=f'<joint name="other"{second}{first}', extra=IGNORED))
@@ -80,6 +152,40 @@ def test_limits_are_rounded_inwards_where_they_are_no_doubles_and_only_there(tmp
         exactly = exact(offset) - exact(limit)
         assert outwards * (exact(q) - exactly) <= 0
         assert outwards * (exact(float(np.nextafter(q, outwards * np.inf))) - exactly) > 0
+
+
+@given(
+    st.tuples(*[st.floats(-2, 2)] * 2).map(sorted),
+    st.one_of(st.floats(1e-3, 1e3), st.floats(-1e3, -1e-3)),
+    st.floats(-1, 1),
+)
+def test_a_leaders_limits_are_the_last_doubles_with_all_within_theirs(own, factor, offset):
+    """In exact fractions, for a leader without limits of its own."""
+    plain = Joint("a/leads", JointKind.PRISMATIC, "world", "one", np.eye(3)[0], np.eye(4), np.eye(4), 0, -np.inf, np.inf)
+    behind = replace(plain, name="a/follows", index=1, lower=own[0], upper=own[1])
+    followers = followers_of([plain, behind], [Coupling({"a/leads": -factor, "a/follows": 1.0}, offset)], ())
+    leads = followers["a/follows"].leader
+    assume(leads == "a/leads")
+    try:
+        (found,) = leading([plain, behind], followers)
+    except SceneError:
+        assume(False)
+
+    def within(q: float) -> bool:
+        return Fraction(own[0]) <= Fraction(factor) * Fraction(q) + Fraction(offset) <= Fraction(own[1])
+
+    assert within(found.lower)
+    assert within(found.upper)
+    assert not within(float(np.nextafter(found.lower, -np.inf)))
+    assert not within(float(np.nextafter(found.upper, np.inf)))
+
+
+def test_no_point_of_a_fast_finger_is_farther_than_the_reach_says(tmp_path):
+    scene = parsed(write(tmp_path, more=jaws("prismatic", -8, 0.3, own=(-4, 4)), extra=IGNORED))
+    reach = Tree(list(scene.joints), list(scene.bodies)).reach(list(scene.geometries), 0.0)
+    (pad,) = [geometry for geometry in scene.geometries if geometry.body == "arm/other_link"]
+    far = Kinematics.of(scene).points("world", pad.body, pad.vertices, np.array([scene.s_lower, scene.s_upper]))
+    assert 2 < np.linalg.norm(far, axis=2).max() <= reach
 
 
 def test_an_ignored_pair_that_could_not_be_certified_is_not_said_to_be(tmp_path):
@@ -140,6 +246,42 @@ def test_the_verifier_refuses_followers_that_make_no_sense(tmp_path, words, forg
         check_scene(replace(scene, joints=tuple(forge(joint) if joint.follows else joint for joint in scene.joints)))
     assert caught.value.code == "proof_model"
     assert words in caught.value.message
+
+
+@pytest.mark.parametrize("length", [0.0, 2.0**-10, 2.0**12, np.inf, np.nan])
+def test_the_verifier_refuses_a_slide_that_follows_too_slowly_or_too_fast(tmp_path, length):
+    scene = parsed(write(tmp_path, more=jaws("prismatic", -0.5, 0.1), extra=IGNORED))
+    check_scene(scene)
+    with pytest.raises(ProofError, match="the axis of arm/other"), np.errstate(invalid="ignore"):
+        check_scene(forged(scene, "arm/other", lambda joint: replace(joint, axis=length * joint.axis)))
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0, 1 + 1e-8])
+@pytest.mark.parametrize("name", ["arm/turn", "arm/grip"])
+def test_the_verifier_refuses_a_longer_axis_of_what_follows_nothing(tmp_path, name, factor):
+    scene = parsed(write(tmp_path, more=jaws("prismatic", -0.5, 0.1), extra=IGNORED))
+    with pytest.raises(ProofError, match=f"the axis of {name}"):
+        check_scene(forged(scene, name, lambda joint: replace(joint, axis=factor * joint.axis)))
+
+
+@pytest.mark.parametrize("times", [0.5, 2.0])
+def test_a_proof_about_a_slide_is_none_about_a_slower_or_a_faster_one(tmp_path, times):
+    """The finger stops 2 mm before the post, moves half as far, or would go into it."""
+    _, scene = gripper(tmp_path, -0.09, -0.8)
+    proof = search(scene, Motion(Space.Q, np.array([[0.0, 0.0], [0.0, 0.06]]))).proof
+    assert "  'arm/other' moves with 'arm/grip', 0.8 times as far" in verify_motion(proof).lines()
+    other = forged(scene, "arm/other", lambda joint: replace(joint, axis=times * joint.axis))
+    assert other.hash != scene.hash
+    if times > 1:
+        with pytest.raises(ProofError, match="does not keep arm/other_link/pad and room/walls/post apart"):
+            verify_motion(replace(proof, scene=other))
+    else:
+        assert f"  'arm/other' moves with 'arm/grip', {0.8 * times:.9g} times as far" in verify_motion(replace(proof, scene=other)).lines()
+
+
+def forged(scene: Scene, name: str, forge: Callable[[Joint], Joint]) -> Scene:
+    """The scene with another joint of this name."""
+    return replace(scene, joints=tuple(forge(joint) if joint.name == name else joint for joint in scene.joints))
 
 
 def test_the_verifier_refuses_joints_that_move_together_on_one_way(tmp_path):

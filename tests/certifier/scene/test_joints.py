@@ -151,7 +151,7 @@ def test_limits_of_ones_own(tmp_path):
         ({"extra": "limits: {turn: [0, 3]}\n"}, "scene_field", "limits.arm/turn", "0 to 3 is not within the joint's own limits, -1 to 2"),
         ({"extra": "limits: {turn: [1, 1]}\n"}, "scene_field", "limits.turn", "hold a joint by fix"),
         ({"extra": "limits: {turn: 1}\n"}, "scene_field", "limits.turn", "[lower, upper]"),
-        ({"more": FINGERS}, "unsupported_joint", "directives", "hold one of them, as in fix: {arm/"),
+        ({"more": FINGERS.replace("1.5", "1500")}, "unsupported_joint", "directives", "hold one of them, as in fix: {arm/"),
         ({"more": FINGERS, "extra": "fix: {grip: 0.03, other: 0.03}\n"}, "scene_field", "fix", "cannot be held at these positions"),
         ({"more": FINGERS.replace('"0.09"', '"0.02"'), "extra": "fix: {grip: 0.03}\n"}, "scene_field", "fix.arm/other", "0.049"),
     ],

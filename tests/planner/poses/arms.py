@@ -13,7 +13,7 @@ from pydrake.multibody.tree import JacobianWrtVariable
 
 from certifier.kinematics import rotation
 from certifier.model import Array, Joint, JointKind, Scene
-from certifier.scene.drake_model import build_diagram, drake_name
+from certifier.scene.drake_model import InDrake, build_diagram, drake_name
 from certifier.scene.load import load_scene
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
@@ -33,7 +33,7 @@ class Arm:
 
     def pose(self, q: Array) -> RigidTransform:
         _, plant, context = self._drake
-        plant.SetPositions(context, q)
+        plant.SetPositions(context, InDrake(self.scene, plant).at(q))
         return plant.EvalBodyPoseInWorld(context, plant.GetBodyByName(drake_name(self.frame)))
 
     def conditioned(self, q: Array) -> float:
@@ -66,6 +66,8 @@ def arm(name: str) -> Arm:
     match name:
         case "gantry":
             return Arm(gantry(), "gantry/tool")
+        case "fingers":
+            return Arm(fingers(), "fingers/tip")
         case "endless":
             return Arm(endless(), "turner/tool")
         case _:
@@ -104,6 +106,25 @@ def gantry() -> Scene:
             (turn, (0, 0, 1), (-2.9, 2.9), placed((0, 0.02, -0.1))),
         ],
     )
+
+
+def fingers() -> Scene:
+    """A hand that turns, with two fingers. One slides 2.5 times as far as the other one, and the other way; a tip turns at its end."""
+    slide, turn, eye = JointKind.PRISMATIC, JointKind.REVOLUTE, np.eye(4)
+
+    def joint(name: str, kind: JointKind, parent: str, child: str, axis: ArrayLike, index: int, follows: bool = False) -> Joint:
+        X, ends = placed((0.3, 0.1, 0.05), (0, 1, 0), 0.4), (-0.3, 0.4) if kind is slide else (-2.0, 2.0)
+        return Joint(f"fingers/{name}", kind, parent, f"fingers/{child}", np.array(axis), X, eye, index, *ends, follows=follows)
+
+    joints = (
+        joint("base", turn, "world", "base", (0.0, 0.6, 0.8), 0),
+        joint("hand", turn, "fingers/base", "hand", (1.0, 0.0, 0.0), 1),
+        joint("grip", slide, "fingers/hand", "one", (0.0, 1.0, 0.0), 2),
+        joint("other", slide, "fingers/hand", "two", (0.0, -1.5, 2.0), 2, follows=True),
+        joint("tip", turn, "fingers/two", "tip", (0.0, 1.0, 0.0), 3),
+    )
+    bodies = ("world", *(one.child for one in joints))
+    return Scene("fingers", joints, bodies, (), (), (), np.zeros(4))
 
 
 def endless() -> Scene:

@@ -12,7 +12,7 @@ from certifier.errors import RegionError
 from planner.poses.frame import frame_of, pose_at, pose_of
 from tests.planner.poses.arms import apart, arm
 
-ARMS = ("iiwa_shelf", "ur3e_bin", "dual_ur3e", "planar_2dof", "gantry", "endless")
+ARMS = ("iiwa_shelf", "ur3e_bin", "dual_ur3e", "planar_2dof", "gantry", "endless", "fingers")
 
 
 def drakes(pose):
@@ -41,7 +41,7 @@ def test_roll_pitch_and_yaw_are_drakes(rpy):
     assert max(apart(drakes(pose_of([1, 2, 3], rpy)), theirs)) < 1e-14
 
 
-@given(st.sampled_from(("iiwa_shelf", "gantry")), st.integers(0, 2**32 - 1))
+@given(st.sampled_from(("iiwa_shelf", "gantry", "fingers")), st.integers(0, 2**32 - 1))
 def test_a_joints_lever_bounds_how_far_the_frame_moves(name, seed):
     one, rng = arm(name), np.random.default_rng(seed)
     frame, q = frame_of(one.scene, one.frame), one.random(np.random.default_rng(seed))

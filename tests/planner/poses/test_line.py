@@ -14,12 +14,13 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from certifier.errors import RegionError
 from certifier.model import JointKind
+from planner.poses.frame import frame_of, pose_at
 from planner.poses.inverse import inverse
-from planner.poses.line import keeps, line
+from planner.poses.line import deviation, keeps, line
 from tests.certifier.scenes import planar_arm
 from tests.planner.poses import arms
 
-ARMS = ("iiwa_shelf", "ur3e_bin", "gantry", "dual_ur3e", "endless")
+ARMS = ("iiwa_shelf", "ur3e_bin", "gantry", "dual_ur3e", "endless", "fingers")
 EACH = 40
 ROUNDED = 1e-9
 STRETCHED = np.array([0.2, 0.6, 0.1, -1.3, 0.3, 0.9, 0.2])
@@ -216,3 +217,20 @@ def test_a_motion_that_only_turns_the_frame_keeps_to_its_line():
     assert found.reason is None
     assert keeps(scene, "link2", start, **there, q=found.q, metres=1e-3, radians=1e-2)
     assert not keeps(scene, "link2", start, **there, q=np.array([start, start + np.array([0.02, 0.0]), goal]), metres=1e-3, radians=1e-2)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_slide_that_is_faster_counts_as_one_that_goes_farther(seed):
+    """One finger slides 2.5 times as far as the other, or alone, by 2.5 times its positions."""
+    scene = arms.arm("fingers").scene
+    still = replace(scene.joint_above["fingers/one"], kind=JointKind.WELD, axis=np.zeros(3), index=None, lower=None, upper=None)
+    other = scene.joint_above["fingers/two"]
+    alone = replace(other, axis=other.axis / 2.5, lower=2.5 * other.lower, upper=2.5 * other.upper, follows=False)
+    plain = replace(scene, joints=tuple({still.name: still, alone.name: alone}.get(joint.name, joint) for joint in scene.joints))
+    found = []
+    for one, times in ((scene, np.ones(4)), (plain, np.array([1.0, 1.0, 2.5, 1.0]))):
+        frame, places = frame_of(one, "fingers/tip"), np.random.default_rng(seed).uniform(-0.3, 0.3, (2, 4)) * times
+        poses = [pose_at(frame, q) for q in (places[0], places.mean(axis=0), places[1])]
+        found.append(deviation(frame, *places, *poses, 0.1))
+    assert found[0] == pytest.approx(found[1], rel=1e-12)
+    assert frame_of(scene, "fingers/tip").levers[2] == 2.5 * frame_of(plain, "fingers/tip").levers[2] == pytest.approx(2.5)
