@@ -263,18 +263,21 @@ def _arms(document: Document) -> list[str]:
         cells += [f"{planned[key]} of {planned['asked']}" for key in ("answered", "proved")] if planned else ["", ""]
         rows.append([*cells, ", ".join(row["failed"])])
         said += [f"{row['arm']}, {step}: {reason}" for step, reason in row["failed"].items()]
-    header = ["arm", "joints", "pairs", "ignored", "draft, s", "load, s", "proposal, s", "first region", "share", "proof, MB", "grow, s"]
-    header += ["verify, s", "plan p50, s", "worst", "answered", "proved", "failed"]
+    header = ["arm", "joints", "pairs", "ignored", "draft, s", "load, s", "proposal, s", "first region", "0.9", "share"]
+    header += ["proof, MB", "grow, s", "verify, s", "plan p50, s", "worst", "answered", "proved", "failed"]
     return [f"{document['deadline']:g} s for each region, on all cores.", _table(header, rows), *said]
 
 
 def _regions(grown: Document) -> list[str]:
-    """Returns when there was a proposal, the share and the time of the first certified region, and share and megabytes of the last."""
+    """Returns when there was a proposal, share and time of the first certified region and of the first with 0.9, and share and megabytes of
+    the last.
+    """
     proposed = f"{grown['proposal_seconds']:.1f}" if "proposal_seconds" in grown else ""
     if "curve" not in grown:
-        return [proposed, "", "", ""]
-    first = grown["curve"][0]
-    return [proposed, f"{first['share']:.3f} after {first['seconds']:.0f} s", f"{grown['share']:.3f}", f"{grown['proof_bytes'] / 1e6:.1f}"]
+        return [proposed, "", "", "", ""]
+    reached = [f"{region['share']:.3f} after {region['seconds']:.0f} s" for region in grown["curve"]]
+    most = next((said for said, region in zip(reached, grown["curve"], strict=True) if region["share"] >= 0.9), "")
+    return [proposed, reached[0], most, f"{grown['share']:.3f}", f"{grown['proof_bytes'] / 1e6:.1f}"]
 
 
 def _survey(document: Document) -> list[str]:
