@@ -27,8 +27,8 @@ def path_file(path: str) -> GivenPath:
 
     Rows of q in JSON and YAML may be names of configurations.
 
-    A CSV file has one row for each waypoint. Its first row may name the columns; one that is called t holds the times. Its numbers are q,
-    unless all other columns' names begin with s.
+    A CSV file has one row for each waypoint. Its first row may name the columns: q1, q2, ... or s1, s2, ..., and t for the times. Its
+    numbers are q without names. The columns are in the scene's order of joints.
 
     Raises:
         RegionError: path_file, saying what is wrong with it; or what is wrong with the curve, as certifier.motion.splines.
@@ -106,8 +106,13 @@ def _table(path: str) -> dict[str, Array]:
             raise RegionError("path_file", f"{path}, waypoint {i}: it must have {columns} numbers, as the first row", field=FIELD)
     numbers = np.array([[float(text) for text in row] for row in rows])
     timed = np.array([name == "t" for name in names], dtype=bool) if names else np.zeros(numbers.shape[1:], dtype=bool)
-    in_s = bool(names) and all(name.startswith("s") for name in names if name != "t")
-    found = {"s" if in_s else "q": numbers[:, ~timed]}
+    own = [name for name in names if name != "t"]
+    kind = "s" if own and own[0].startswith("s") else "q"
+    if own and own not in ([f"{kind}{i}" for i in range(first, first + len(own))] for first in (0, 1)):
+        problem = f"{path}: columns are in the scene's order of joints, and their names {', '.join(own)[:200]} are not looked up"
+        hint = "name them q1, q2, ... or s1, s2, ... in that order, and t; or leave the first row out"
+        raise RegionError("path_file", problem, field=FIELD, hint=hint)
+    found = {kind: numbers[:, ~timed]}
     return found | ({"t": numbers[:, timed][:, 0]} if timed.any() else {})
 
 

@@ -25,14 +25,14 @@ def ended_by(error: CirisError, hindrance: str) -> CirisError:
 
 
 def at_deadline(scene: Scene, state: GrowthState | None, told: str) -> str:
-    """Returns the reason of a growth without a region whose time has run out; more time does not help where something hinders it.
+    """Returns the reason of a growth without a region whose time has run out, with what hinders it.
 
     Args:
         told: what is known to hinder a proposal that is not made yet; "" where nothing is.
     """
     hindrance = told if state is None or state.start is None else state.start.hindrance
     if hindrance or state is None or not state.obstacles:
-        return hindrance or DEADLINE
+        return f"{DEADLINE}; {hindrance}" if hindrance else DEADLINE
     index, worst = max(state.obstacles.items(), key=lambda item: item[1].times)
     pair, rounds = scene.pairs[index], "1 round" if worst.times == 1 else f"{worst.times} rounds"
     return f"{DEADLINE}; {pair.a} and {pair.b} were in the way of a region in {rounds}"
@@ -48,7 +48,8 @@ def refusal(reason: str, late: bool) -> CirisError:
     if reason.startswith(REVOKED):
         return CirisError("revoked", reason, hint="grow a region of the new scene from another seed")
     if NO_ROOM in reason or TOO_LONG in reason:
-        return CirisError("not_grown", reason, hint=mend(reason))
+        hint = mend(reason.removeprefix(f"{DEADLINE}; "))
+        return CirisError("not_grown", reason, hint=f"allow more time, or {hint}" if late else hint)
     look = "look at the pair named"
     if not late:
         return CirisError("not_grown", reason, hint=f"try another seed, or {look}")

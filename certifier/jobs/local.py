@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -218,15 +219,17 @@ class _Memory:
         said = {"index": action.iteration, "label": action.label, "pairs": len(action.pairs), "parts": len(work)}
         self.tell("iteration", {**said, "state": "running"})
         # The program (11) of a pair takes milliseconds, so children would not pay.
-        results = side_by_side(certify, work, 1 if action.cells == 1 else self.processes, lambda index: alike(self.scene, index))
-        for (index, _), result in zip(work, results, strict=False):
-            found.setdefault(index, []).append(result)
-            stage = None if result.stage is None else result.stage.value
-            settled = {"index": index, "state": result.outcome.value, "stage": stage, "seconds": result.seconds}
-            self.tell("pairs", {"iteration": action.iteration, "pairs": [settled]})
-            failures += result.outcome is not Outcome.CERTIFIED
-            if failures == action.failures:
-                break
+        processes = 1 if action.cells == 1 else self.processes
+        # An interrupt that comes while children end would be lost if the results were only dropped.
+        with closing(side_by_side(certify, work, processes, lambda index: alike(self.scene, index))) as results:
+            for (index, _), result in zip(work, results, strict=False):
+                found.setdefault(index, []).append(result)
+                stage = None if result.stage is None else result.stage.value
+                settled = {"index": index, "state": result.outcome.value, "stage": stage, "seconds": result.seconds}
+                self.tell("pairs", {"iteration": action.iteration, "pairs": [settled]})
+                failures += result.outcome is not Outcome.CERTIFIED
+                if failures == action.failures:
+                    break
         outcomes = [result.outcome for parts in found.values() for result in parts]
         self.tell("iteration", {**said, "state": combine(outcomes).value})
         reached = [(index, r.outcome, r.weakness, r.open_cells) for index, parts in found.items() for r in parts]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Generator, Hashable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 
@@ -16,7 +16,7 @@ Asked = tuple[int, int]
 """A pair's index, and the number of the part."""
 
 
-def side_by_side(certify: CertifyPart, asked: Sequence[Asked], processes: int, kind: Callable[[int], Hashable]) -> Iterator[PairResult]:
+def side_by_side(certify: CertifyPart, asked: Sequence[Asked], processes: int, kind: Callable[[int], Hashable]) -> Generator[PairResult]:
     """Yields the results of parts of pairs in their order, which do not depend on the number of processes.
 
     Args:

@@ -75,11 +75,15 @@ def sweeps_of(joints: Sequence[Joint], names: Sequence[str], limits: Limits, cou
 
     Raises:
         SceneError: ``unknown_name``; ``joint_range`` for a range that is not finite; ``scene_field`` where a coupled joint leaves its
-            limits, or where two of those that are coupled are named.
+            limits, where two of those that are coupled are named, or for one that its model holds.
     """
     by_name = {joint.name: joint for joint in joints if joint.index is not None}
+    still = {name for coupling in couplings if len(coupling.factors) == 1 for name in coupling.factors}
     found = {}
     for name in by_full_name(dict.fromkeys(names), by_name, "fix"):
+        if name in still:
+            message = f"joint {name} mimics another one with the multiplier 0, so it does not move, and cannot be swept"
+            raise SceneError("scene_field", message, field=f"fix.{name}", hint="leave it out of fix")
         (joint,) = narrowed([by_name[name]], _limits_of(limits, name, by_name))
         lower, upper = range_of(joint)
         if not np.isfinite([lower, upper]).all():

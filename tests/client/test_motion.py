@@ -181,6 +181,9 @@ def test_files_of_curves_say_the_same(tmp_path: Path) -> None:
         ("a.csv", "0,0\n0,x\n", "waypoint 1: 'x' is no number"),
         ("a.csv", "0,0\n0\n", "waypoint 1: it must have 2 numbers"),
         ("a.csv", "", "no CSV file"),
+        ("a.csv", "elbow,shoulder\n0,0\n0,1\n", "their names elbow, shoulder are not looked up"),
+        ("a.csv", "q2,q1\n0,0\n0,1\n", "are not looked up"),
+        ("a.csv", "t,shoulder,swivel\n0,0,0\n1,0,1\n", "are not looked up"),
     ],
 )
 def test_a_bad_file_is_refused_with_what_is_wrong(tmp_path: Path, name: str, content: str, words: str) -> None:

@@ -204,7 +204,10 @@ SCENES: Table = {
         lambda t: t.scene(more=MIMIC, extra="fix: {turn: 0, follow: 1}"),
         lambda t: t.scene(more=MIMIC, extra="fix: {turn: swept, follow: swept}"),
     ],
-    ("scene_field", "fix.arm/follow"): [lambda t: t.scene(more=MIMIC, extra="fix: {turn: swept, follow: 1}")],
+    ("scene_field", "fix.arm/follow"): [
+        lambda t: t.scene(more=MIMIC, extra="fix: {turn: swept, follow: 1}"),
+        lambda t: t.scene(more=MIMIC.replace("<mimic ", '<mimic multiplier="0" '), extra="fix: {follow: swept}"),
+    ],
     ("joint_range", "fix.arm/turn"): [lambda t: t.scene(kind="continuous", limit="", extra="fix: {turn: swept}")],
     ("unsupported_joint", "fix.arm/turn"): [lambda t: t.scene(more=TIP, extra="fix: {turn: swept}")],
     ("unsupported_shape", "directives"): [

@@ -124,7 +124,7 @@ def test_what_hinders_a_proposal_is_told_and_explains_a_deadline(monkeypatch: py
     with database().write() as session:
         jobs.lock(session, job_id).deadline_at = utcnow() - timedelta(seconds=1)
     coordinate(job_id)
-    assert (job_of(job_id).error or {})["message"] == hindrance
+    assert (job_of(job_id).error or {})["message"] == f"the deadline was reached; {hindrance}"
     count = len(events_of(job_id))
     tell({})
     assert len(events_of(job_id)) == count, "the job has ended"

@@ -52,4 +52,7 @@ def test_a_deadline_names_the_pair_that_was_most_in_the_way() -> None:
         f"{first.a} and {first.b} were in the way of a region in 1 round"
     )
     assert at_deadline(scene, None, "") == DEADLINE
-    assert at_deadline(scene, None, f"a{NO_ROOM}") == f"a{NO_ROOM}"
+    hindered = at_deadline(scene, None, f"the seed is near{NO_ROOM}")
+    assert hindered == f"{DEADLINE}; the seed is near{NO_ROOM}"
+    assert refusal(hindered, late=True).hint == "allow more time, or move the seed away from the contact"
+    assert refusal(f"the seed is near{NO_ROOM}", late=False).hint == "move the seed away from the contact"

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
 import os
+from collections.abc import Generator, Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from certifier.errors import CirisError
+from certifier.growth.options import GrowthOptions
 from certifier.growth.pairs import alike
-from certifier.jobs.parallel import side_by_side
+from certifier.jobs import local
+from certifier.jobs.pairs import CertifyPart
+from certifier.jobs.parallel import Asked, side_by_side
 from certifier.outcome import Outcome
 from certifier.pair.result import PairResult, Stage
 from certifier.scene import load_scene
+from tests.certifier.scenes import planar_arm
+from tests.scenes import box_seed
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 
@@ -30,6 +38,22 @@ def test_results_come_in_order_and_alike_pairs_share_a_child() -> None:
         children.setdefault((int(index) % 4, int(part)), set()).add(child)
     assert all(len(pids) == 1 for pids in children.values())
     assert str(os.getpid()) not in {child for _, _, child in found}
+
+
+def test_an_interrupt_while_children_end_is_heard(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An exception in a generator that is only dropped would be printed and forgotten."""
+    scene = planar_arm(2)
+
+    def interrupted(certify: CertifyPart, asked: Sequence[Asked], *_: object) -> Generator[PairResult]:
+        try:
+            yield from itertools.starmap(certify, asked)
+            yield PairResult(Outcome.INCONCLUSIVE, Stage.CELLS)  # for which nobody asks
+        finally:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(local, "side_by_side", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        local.grow(scene, GrowthOptions(seed=box_seed(np.zeros(2), 0.1)))
 
 
 def test_pairs_of_the_same_parts_are_alike() -> None:

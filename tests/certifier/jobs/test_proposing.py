@@ -43,8 +43,8 @@ def test_a_deadline_while_it_proposes_is_explained_by_what_is_known_of_the_seed(
     monkeypatch.setattr(local, "run_in_child", run)
     with pytest.raises(CirisError) as error:
         local.grow(planar_arm(2), GROW, deadline_s=1.0)
-    assert (error.value.code, error.value.message) == ("not_grown", known or "the deadline was reached")
-    assert error.value.hint == ("move the seed away from the contact" if known else "allow more time")
+    assert (error.value.code, error.value.message) == ("not_grown", f"the deadline was reached; {known}".removesuffix("; "))
+    assert error.value.hint == ("allow more time, or move the seed away from the contact" if known else "allow more time")
 
 
 def test_faces_and_hindrance_are_told_before_iris_ends(monkeypatch: pytest.MonkeyPatch) -> None:
