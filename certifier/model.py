@@ -189,10 +189,14 @@ class Scene(ConfigurationSpace):
         """Returns the joints that move with another one."""
         return tuple(j for j in self.joints if j.follows)
 
+    def leader_of(self, joint: Joint) -> Joint:
+        """Returns the joint that another one follows, which is one of :attr:`following`."""
+        return self.moving[joint.index or 0]
+
     @property
     def in_order(self) -> str:
         """Returns the names of the n joints in position order, and which ones follow them, for the hint of an error."""
-        behind = [f"{joint.name} follows {self.moving[joint.index or 0].name}" for joint in self.following]
+        behind = [f"{joint.name} follows {self.leader_of(joint).name}" for joint in self.following]
         return "; ".join([f"in order: {', '.join(joint.name for joint in self.moving)}", *behind])
 
     @cached_property

@@ -20,7 +20,7 @@ from client.options import CERTIFY, GROW
 from client.output import Screen, print_json
 from client.polytopes import polytope_file
 from client.request import refuse_of_service, request
-from client.seeds import seed_of, whence
+from client.seeds import place_of_seed, seed_of
 
 OK, NO = 0, 1
 
@@ -101,7 +101,7 @@ def grow(args: Namespace) -> int:
     try:
         return _grow(args)
     except CirisError as error:
-        error.field = whence(error.field, args.scene, (getattr(args, "seed.q") or [None])[0])
+        error.field = place_of_seed(error.field, args.scene, (getattr(args, "seed.q") or [None])[0])
         raise
 
 

@@ -42,7 +42,7 @@ def seed_of(scene: str, q: str | None) -> Given:
         raise CirisError("seed_file", "it holds no list of numbers called q", field=str(path), hint=hint) from None
 
 
-def whence(field: str | None, scene: str, q: str | None) -> str | None:
+def place_of_seed(field: str | None, scene: str, q: str | None) -> str | None:
     """Returns the place of an error in a request about a seed: where the seed was not given as ``q``, its file has the place."""
     if q is not None or not field or not re.match(r"seed\.q(?![\w.])", field):
         return field

@@ -48,8 +48,7 @@ def refusal(reason: str, late: bool) -> CirisError:
     if reason.startswith(REVOKED):
         return CirisError("revoked", reason, hint="grow a region of the new scene from another seed")
     if NO_ROOM in reason or TOO_LONG in reason:
-        hint = mend(reason.removeprefix(f"{DEADLINE}; "))
-        return CirisError("not_grown", reason, hint=f"allow more time, or {hint}" if late else hint)
+        return CirisError("not_grown", reason, hint=f"allow more time, or {mend(reason)}" if late else mend(reason))
     look = "look at the pair named"
     if not late:
         return CirisError("not_grown", reason, hint=f"try another seed, or {look}")

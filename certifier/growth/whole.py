@@ -31,8 +31,6 @@ from certifier.polytopes.cutting import BARELY, Cut, cut, lost_together, samples
 from certifier.polytopes.proved import ProvedBox
 from certifier.polytopes.pushed import pushed
 
-NEARBY = 0.0
-"""The reach of the stage that certifies a box about a seed in a narrow place."""
 FIRST = 0.7
 """In the first stage the faces of the proposal lie this part of their distance from the seed."""
 FARTHEST, FARTHER, FAR = 1.45, 1.25, 1.2
@@ -76,9 +74,9 @@ EARLY_EFFORT = 24 * SLICE
 
 
 def begin_whole(scene: Scene, state: GrowthState, start: Start) -> Transition:
-    """Asks to certify a box about a seed in a narrow place, or else what :func:`_first_stage` does."""
+    """Asks to certify a box about a seed in a narrow place, as stage 0, or else begins with stage 1."""
     box = nearby(scene, start)
-    return _first_stage(scene, state, start) if box is None else begin_stage(scene, state, NEARBY, box)
+    return _first_stage(scene, state, start) if box is None else begin_stage(scene, state, FIRST, box, stage=0)
 
 
 def _first_stage(scene: Scene, state: GrowthState, start: Start, passed: float = 0.0) -> Transition:
@@ -94,7 +92,7 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
     whole, best = state.whole, state.best
     assert whole is not None
     assert best is not None
-    if whole.reach == NEARBY:
+    if whole.stage == 0:
         return _first_stage(scene, state, start, whole.passed)
     kept = _kept(scene, start, best.polytope)
     if start.again:
@@ -102,13 +100,14 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
     if kept == 1 or whole.stage == state.options.stages or (whole.reach > 1 and kept < whole.kept + GAIN):
         return Transition(state, Finish(Outcome.CERTIFIED, "certified"))
     reach = FAR if whole.reach >= 1 else FARTHEST if whole.passed <= SOON else FARTHER
-    return begin_stage(scene, state, reach, pushed(best.polytope, start.seed, reach, start.rows), kept, whole.passed)
+    return begin_stage(scene, state, reach, pushed(best.polytope, start.seed, reach, start.rows), kept, whole.passed, whole.stage + 1)
 
 
-def begin_stage(scene: Scene, state: GrowthState, reach: float, polytope: Polytope, kept: float = 0.0, passed: float = 0.0) -> Transition:
+def begin_stage(
+    scene: Scene, state: GrowthState, reach: float, polytope: Polytope, kept: float = 0.0, passed: float = 0.0, stage: int = 1
+) -> Transition:
     """Asks to certify all pairs on a polytope; what was proved in the stage before does not carry over to it."""
     box = ProvedBox.of_program(scene, polytope)
-    stage = 0 if reach == NEARBY else 1 if state.whole is None else state.whole.stage + 1
     grouped = _together(scene, state, polytope)
     begun = Whole(reach, kept, polytope, **vars(box), since=passed, passed=passed, stage=stage, together=grouped)
     return _next(scene, replace(state, whole=begun))
@@ -153,7 +152,7 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
         return _next(scene, replace(state, whole=whole))
     most = {i: _most_loss(state, whole, i, 0 if report.weaknesses[i].joints else HARD) for i in failing}
     corners = [corner for i in failing for corner in _corners(scene, i, report.weaknesses[i], most[i])]
-    around = _copy(scene, start, whole.reach) if NEARBY < whole.reach < 1 else start.rows
+    around = start.rows if whole.reach >= 1 else _copy(scene, start, whole.reach)
     made = cut(scene, whole.polytope, start.keep, corners, around)
     final = {*action.ending} & {*action.hard}
     # Cells without a point to cut off miss the polytope, and are settled in the next rounds.

@@ -41,22 +41,21 @@ def uniform_in_q(polytope: Polytope, space: ConfigurationSpace, chains: int, eac
     starts, draws = np.random.SeedSequence(seed).spawn(2)
     s = hit_and_run(polytope, chebyshev_center(polytope)[0], chains, int(starts.generate_state(1)[0]))
     rng = np.random.default_rng(draws)
-    s = _walk(polytope, space, s, _FORGET, rng)
+    columns = csc_array(polytope.C)
+    s = _walk(columns, polytope.d, space, s, _FORGET, rng)
     found = np.empty((chains, each, s.shape[1]))
     for i in range(each):
-        s = found[:, i] = _walk(polytope, space, s, _THIN, rng)
+        s = found[:, i] = _walk(columns, polytope.d, space, s, _THIN, rng)
     return found
 
 
-def _walk(polytope: Polytope, space: ConfigurationSpace, s: Array, rounds: int, rng: np.random.Generator) -> Array:
+def _walk(columns: csc_array, d: Array, space: ConfigurationSpace, s: Array, rounds: int, rng: np.random.Generator) -> Array:
     """Returns the chains s (k, n) after that many rounds over all axes."""
-    columns, places = csc_array(polytope.C), rng.random((rounds, s.shape[1], len(s)))
-    begins, faces = columns.indptr.astype(np.int64), columns.indices.astype(np.int64)
-    walked = np.empty(s.shape)
+    places, walked = rng.random((rounds, s.shape[1], len(s))), np.empty(s.shape)
     for first in range(0, len(s), LANES):
         some = slice(first, first + LANES)
         lanes = np.ascontiguousarray(s[some].T)
-        _rounds(begins, faces, columns.data, polytope.d, space.revolute, np.ascontiguousarray(places[:, :, some]), lanes)
+        _rounds(columns.indptr, columns.indices, columns.data, d, space.revolute, np.ascontiguousarray(places[:, :, some]), lanes)
         walked[some] = lanes.T
     return walked
 

@@ -24,7 +24,7 @@ def own_configurations(scene: Scene, given: Mapping[str, Given]) -> dict[str, di
         SceneError: ``scene_field`` for a wrong number of positions, or one that its joint cannot have; ``unknown_name``.
     """
     moving = {joint.name: joint for joint in scene.moving}
-    leaders = {joint.name: scene.moving[joint.index or 0].name for joint in scene.following}
+    leaders = {joint.name: scene.leader_of(joint).name for joint in scene.following}
     found = {}
     for name, said in given.items():
         field = f"configurations.{name}"

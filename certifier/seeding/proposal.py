@@ -15,7 +15,7 @@ TOO_LONG = ", which is too little to be seen beside it"
 def mend(hindrance: str) -> str:
     """Returns what to do about a hindrance."""
     if NO_ROOM in hindrance:
-        return f"move {'the seed' if hindrance.startswith('the seed') else 'it'} away from the contact"
+        return f"move {'the seed' if 'the seed is' in hindrance else 'it'} away from the contact"
     return "set narrower limits for the joint in the scene file"
 
 

@@ -39,7 +39,7 @@ def check_scene(scene: Scene) -> None:
 
 def following(scene: Scene) -> list[str]:
     """Returns a line for each joint that follows another one."""
-    return [f"  '{joint.name}' moves with '{scene.moving[joint.index or 0].name}'{_how_far(joint)}" for joint in scene.following]
+    return [f"  '{joint.name}' moves with '{scene.leader_of(joint).name}'{_how_far(joint)}" for joint in scene.following]
 
 
 def _how_far(joint: Joint) -> str:
@@ -102,7 +102,7 @@ def _check_tree(scene: Scene) -> None:
     _require(all(type(i) is int for i in positions) and sorted(positions) == list(range(scene.n)), "the joints' positions")
     for joint in scene.following:
         _require(type(joint.index) is int and 0 <= joint.index < scene.n, f"the position of {joint.name}")
-        leader = scene.moving[joint.index or 0]
+        leader = scene.leader_of(joint)
         same = all(getattr(joint, what) == getattr(leader, what) for what in ("kind", "lower", "upper", "own_limits"))
         _require(same, f"{joint.name}, which follows a joint of another kind or with other limits")
 
