@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from datetime import UTC, datetime
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,9 @@ from sqlalchemy import DateTime, Dialect, LargeBinary
 from sqlalchemy.types import TypeDecorator
 
 Arrays = dict[str, NDArray[np.float64]]
+
+_ONE_AT_A_TIME = Lock()
+"""numpy parses the headers of arrays by ``ast``. In Python 3.11, this raises SystemError when two threads do so (python/cpython#106905)."""
 
 
 def utcnow() -> datetime:
@@ -49,5 +53,5 @@ class Npz(TypeDecorator[Arrays]):
     def process_result_value(self, value: Any, dialect: Dialect) -> Arrays | None:
         if value is None:
             return None
-        with np.load(io.BytesIO(value), allow_pickle=False) as arrays:
+        with _ONE_AT_A_TIME, np.load(io.BytesIO(value), allow_pickle=False) as arrays:
             return dict(arrays)
