@@ -6,7 +6,6 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import timedelta
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -15,7 +14,7 @@ from sqlalchemy.orm import Session
 from api.access import Caller
 from api.named import with_positions
 from certifier.errors import CirisError
-from db import clock, jobs, scenes, webhooks
+from db import jobs, scenes, webhooks
 from db.models import JobRow
 from db.session import Database
 from db.settings import settings
@@ -84,7 +83,7 @@ def _submit(session: Session, asked: Checked, caller: Caller, stored_key: str | 
         kind=body.kind,
         scene_id=asked.scene_id,
         options=asked.options,
-        deadline_at=clock.now(session) + timedelta(seconds=body.deadline_seconds) if body.deadline_seconds else None,
+        deadline_seconds=body.deadline_seconds,
         idempotency_key=stored_key,
         request_digest=digest,
         key_id=caller.key_id,

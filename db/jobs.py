@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Mapping, Sequence
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import Any
 from uuid import uuid4
 
@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session, aliased
 
 from certifier.errors import CirisError
 from certifier.outcome import Outcome
-from db import events, labels, leases, pages, traces, webhooks
+from db import clock, events, labels, leases, pages, traces, webhooks
 from db.ids import found
 from db.models import GrowthRow, JobRow, SceneRow, StepRow
 from db.pages import Page
@@ -34,7 +34,7 @@ def create(
     kind: str,
     scene_id: str,
     options: dict[str, Any],
-    deadline_at: datetime | None = None,
+    deadline_seconds: float | None = None,
     idempotency_key: str | None = None,
     request_digest: str | None = None,
     key_id: str | None = None,
@@ -54,13 +54,15 @@ def create(
             different request; quota_exceeded, when the API key has as many unfinished jobs as it may.
     """
     job_id = str(uuid4())
+    now = clock.now(session)
     new = {
         "id": job_id,
         "project": _project_of(session, scene_id),
         "kind": kind,
         "scene_id": scene_id,
         "options": options,
-        "deadline_at": deadline_at,
+        "created_at": now,
+        "deadline_at": None if deadline_seconds is None else now + timedelta(seconds=deadline_seconds),
         "idempotency_key": idempotency_key,
         "request_digest": request_digest,
         "key_id": key_id,
@@ -133,7 +135,7 @@ def retry(session: Session, job_id: str, key_id: str | None = None) -> JobRow:
         kind=job.kind,
         scene_id=job.scene_id,
         options=job.options,
-        deadline_at=job.deadline_at and utcnow() + (job.deadline_at - job.created_at),
+        deadline_seconds=job.deadline_at and (job.deadline_at - job.created_at).total_seconds(),
         idempotency_key=f"retry:{job.id}",
         key_id=key_id,
         priority=job.priority,

@@ -20,7 +20,7 @@ from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.seeding.limits import check_limits
 from certifier.seeding.options import IRIS_SEEDS, SeedOptions
-from db import events, jobs, regions, steps
+from db import clock, events, jobs, regions, steps
 from db.models import JobRow
 from db.session import Database
 from db.states import JOB, unfinished
@@ -172,9 +172,9 @@ class Cover(Kind):
 
 def _begin(session: Session, job: JobRow, options: CoverOptions, number: int, task: Task, afterwards: Afterwards) -> None:
     """Creates the job that grows a region. It ends with the cover, or earlier."""
-    ends = [job.deadline_at] if job.deadline_at is not None else []
+    ends = [(job.deadline_at - clock.now(session)).total_seconds()] if job.deadline_at is not None else []
     if options.region_seconds is not None:
-        ends.append(utcnow() + timedelta(seconds=options.region_seconds))
+        ends.append(options.region_seconds)
     # Each of the tries of a seeding takes the next random seed, so the next turn begins after them.
     random_seed = (options.random_seed + task.turn * SeedOptions.tries) % IRIS_SEEDS
     seed = SeedOptions(q=task.q, contain=task.contain, random_seed=random_seed)
@@ -184,7 +184,7 @@ def _begin(session: Session, job: JobRow, options: CoverOptions, number: int, ta
         kind="grow",
         scene_id=job.scene_id,
         options=growth.to_document(),
-        deadline_at=min(ends, default=None),
+        deadline_seconds=min(ends, default=None),
         key_id=job.key_id,
         priority=job.priority,
         parent_id=job.id,

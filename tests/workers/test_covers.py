@@ -6,7 +6,6 @@ import json
 import os
 import signal
 from dataclasses import replace
-from datetime import timedelta
 from itertools import count
 from typing import Any
 
@@ -23,7 +22,6 @@ from db import jobs, motions, proofs, regions, scenes, steps
 from db.models import JobRow
 from db.session import database
 from db.states import JOB, unfinished
-from db.types import utcnow
 from planner.cover.options import CoverOptions
 from planner.cover.result import said
 from planner.cover.state import CoverState
@@ -42,10 +40,9 @@ NUMBERS = count(1)
 def cover(scene: Scene, seconds: float | None = None, **options: Any) -> str:
     """Commits a cover of the scene with a padding of its own, so that the regions of other tests do not count. Its regions grow quickly."""
     document = CoverOptions.from_document({"cells": 600, "stages": 1, **options}).to_document()
-    deadline = None if seconds is None else utcnow() + timedelta(seconds=seconds)
     with database().write() as session:
         row = scenes.add(session, replace(scene, padding=scene.padding + 1e-6 * next(NUMBERS)))
-        job, _ = jobs.create(session, kind="cover", scene_id=row.id, options=document, deadline_at=deadline)
+        job, _ = jobs.create(session, kind="cover", scene_id=row.id, options=document, deadline_seconds=seconds)
     send_coordinate(job.id)
     return job.id
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Iterator
-from datetime import timedelta
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,6 @@ from certifier.verify.file import verify_file
 from db import jobs, scenes, steps
 from db.models import JobRow, StepRow
 from db.session import database
-from db.types import utcnow
 from tests.certifier.motions import swing
 from tests.workers.service import Service, ended, events_of, eventually
 from workers.app import send_coordinate
@@ -39,10 +37,9 @@ def client(service: Service) -> Iterator[TestClient]:
 
 def submit(scene: Scene, motion: dict[str, Any], seconds: float | None = None) -> str:
     """Commits a job as the API does, without its checks."""
-    deadline = None if seconds is None else utcnow() + timedelta(seconds=seconds)
     with database().write() as session:
         row = scenes.add(session, scene)
-        job, _ = jobs.create(session, kind="certify-path", scene_id=row.id, options=motion, deadline_at=deadline)
+        job, _ = jobs.create(session, kind="certify-path", scene_id=row.id, options=motion, deadline_seconds=seconds)
     send_coordinate(job.id)
     return job.id
 
