@@ -103,7 +103,7 @@ def picture(document: dict[str, Any]) -> str:
     panels: dict[str, dict[str, list[tuple[float, float]]]] = {}
     for row in document["ways"]:
         if row["way"] in PICTURED:
-            points = [(point["seconds"], point["share"]) for point in row["curve"]]
+            points = [(point["seconds"], point["share"]) for point in row["curve"] if point["share"] is not None]
             panels.setdefault(row["scene"], {way: [] for way in PICTURED})[row["way"]] = points
     shown = [Panel(name, series) for name, series in panels.items() if any(series.values())]
     return draw(shown, "share of the proposal, over seconds", share=True)
@@ -179,8 +179,8 @@ def _grown(name: str, seed: dict[str, Any], paper: PaperOptions | None, limit: f
         "verify_seconds": time.perf_counter() - again,
         "proof_bytes": len(region.proof),
         "cells": measure.cells(region.proof),
-        "share": manifest["share"]["value"],
-        "share_stderr": manifest["share"]["stderr"],
+        "share": measure.share(manifest)["value"],
+        "share_stderr": measure.share(manifest)["stderr"],
         "q_volume": manifest["q_volume"]["value"],
         "ellipsoid": manifest["volume"]["ellipsoid"],
         "faces": len(manifest["halfspace_offsets"]),

@@ -182,7 +182,7 @@ def _grown(cell: _Cell, found: Figures) -> None:
         found["proposal_seconds"] = float(proposed[1])
     region = json.loads(commands.output(done))
     found["curve"] = [{"seconds": point["seconds"], "share": point["share"]} for point in region["provenance"]["growth_curve"]]
-    found |= {"share": region["share"]["value"], "faces": len(region["halfspace_offsets"]), "proof_bytes": cell.proof.stat().st_size}
+    found |= {"share": measure.share(region)["value"], "faces": len(region["halfspace_offsets"]), "proof_bytes": cell.proof.stat().st_size}
 
 
 def _verified(cell: _Cell, _: Figures) -> None:

@@ -46,6 +46,11 @@ def machine() -> dict[str, Any]:
     }
 
 
+def share(manifest: dict[str, Any]) -> dict[str, Any]:
+    """Returns which share of the proposal a region keeps; nothing is known where its growth ended before there was a proposal."""
+    return manifest["share"] or {"value": None, "stderr": None}
+
+
 def cells(data: bytes) -> int:
     """Returns how many cells the partitions in a region's proof file have."""
     proofs = RegionProof.from_bytes(data).proofs

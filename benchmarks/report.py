@@ -16,6 +16,8 @@ PAGE, FIGURES = ROOT / "docs/benchmarks.md", ROOT / "docs/benchmarks"
 
 COVER_ROWS = 16
 """The table of a cover has about this many rows."""
+SEEN = 0.01
+"""A region that keeps less of its proposal is no larger than the box about the seed, as far as samples can tell."""
 LINE = 100
 """A line of docs has at most this many characters, unless it is a line of a table."""
 
@@ -245,7 +247,7 @@ def _robots(document: Document) -> list[str]:
     for row in document["rows"]:
         counts = [str(row.get(key, "")) for key in ("joints", "pairs", "ignored")]
         times = [f"{row['seconds'][verb]:.1f}" if verb in row["seconds"] else "" for verb in columns]
-        share, megabytes = (f"{row['share']:.2f}", f"{row['proof_bytes'] / 1e6:.1f}") if "share" in row else ("", "")
+        share, megabytes = (f"{row['share']:.2f}", f"{row['proof_bytes'] / 1e6:.1f}") if row.get("share") is not None else ("", "")
         rows.append([row["robot"], *counts, *times, share, megabytes, row["ended"]])
     header = ["robot", "joints", "pairs", "ignored", *columns.values(), "share", "proof, MB", "ended"]
     return [f"{document['deadline']:g} s for each region, on all cores.", _table(header, rows)]
@@ -263,21 +265,26 @@ def _arms(document: Document) -> list[str]:
         cells += [f"{planned[key]} of {planned['asked']}" for key in ("answered", "proved")] if planned else ["", ""]
         rows.append([*cells, ", ".join(row["failed"])])
         said += [f"{row['arm']}, {step}: {reason}" for step, reason in row["failed"].items()]
-    header = ["arm", "joints", "pairs", "ignored", "draft, s", "load, s", "proposal, s", "first region", "0.9", "share"]
+    header = ["arm", "joints", "pairs", "ignored", "draft, s", "load, s", "proposal, s", "a region, s", "with 0.01", "with 0.9", "share"]
     header += ["proof, MB", "grow, s", "verify, s", "plan p50, s", "worst", "answered", "proved", "failed"]
     return [f"{document['deadline']:g} s for each region, on all cores.", _table(header, rows), *said]
 
 
 def _regions(grown: Document) -> list[str]:
-    """Returns when there was a proposal, share and time of the first certified region and of the first with 0.9, and share and megabytes of
-    the last.
+    """Returns the seconds until there was a proposal, and a region; share and time of the first region with the share SEEN, and of the
+    first with 0.9; share and megabytes of the last.
     """
     proposed = f"{grown['proposal_seconds']:.1f}" if "proposal_seconds" in grown else ""
     if "curve" not in grown:
-        return [proposed, "", "", "", ""]
-    reached = [f"{region['share']:.3f} after {region['seconds']:.0f} s" for region in grown["curve"]]
-    most = next((said for said, region in zip(reached, grown["curve"], strict=True) if region["share"] >= 0.9), "")
-    return [proposed, reached[0], most, f"{grown['share']:.3f}", f"{grown['proof_bytes'] / 1e6:.1f}"]
+        return [proposed, "", "", "", "", ""]
+
+    def reached(least: float) -> str:
+        known = (region for region in grown["curve"] if (region["share"] or 0.0) >= least)
+        return next((f"{region['share']:.3f} after {region['seconds']:.0f} s" for region in known), "")
+
+    share = "" if grown["share"] is None else f"{grown['share']:.3f}"
+    box = f"{grown['curve'][0]['seconds']:.0f}"
+    return [proposed, box, reached(SEEN), reached(0.9), share, f"{grown['proof_bytes'] / 1e6:.1f}"]
 
 
 def _survey(document: Document) -> list[str]:

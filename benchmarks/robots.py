@@ -44,7 +44,7 @@ def _row(name: str, deadline: float) -> dict[str, Any]:
             checked = json.loads(_timed(row, "scene", "check", scene, "--json"))
             row |= {"joints": len(checked["joints"]), "pairs": len(checked["pairs"]), "ignored": len(checked["ignored"])}
             region = json.loads(_timed(row, "grow", scene, "--local", "--deadline", f"{deadline:g}", "--json", "--out", proof))
-            row |= {"share": region["share"]["value"], "faces": len(region["halfspace_offsets"])}
+            row |= {"share": measure.share(region)["value"], "faces": len(region["halfspace_offsets"])}
             row["proof_bytes"] = Path(proof).stat().st_size
             _timed(row, "verify", proof)
         except CirisError as failed:

@@ -181,7 +181,7 @@ def _step(claim: steps.Claim, scene: Scene) -> Done:
 
 def _accept(claim: steps.Claim, scene: Scene) -> Done:
     """Assembles and verifies the proof of a region. If the verifier refuses it, its ProofError is raised and nothing is stored."""
-    candidate, proposal = stored.value(Candidate, claim.input), _sampled_proposal(claim.scene_id, claim.job_id)
+    candidate = stored.value(Candidate, claim.input)
 
     def read() -> tuple[GrowthState, dict[int, bytes], Account]:
         with database().read() as session:
@@ -192,6 +192,7 @@ def _accept(claim: steps.Claim, scene: Scene) -> Done:
             )
 
     state, held, account = persistently(read)
+    proposal = None if state.start is None else _sampled_proposal(claim.scene_id, claim.job_id)
     region = growing.make_region(scene, state, candidate, held, account, proposal, former_of(scene, state.options))
 
     def save(session: Session, job: JobRow) -> None:
@@ -201,15 +202,16 @@ def _accept(claim: steps.Claim, scene: Scene) -> Done:
 
 
 @lru_cache(maxsize=8)
-def _sampled_proposal(scene_id: str, job_id: str) -> SampledProposal | None:
-    """Returns what the job grows its regions from, sampled; None for a given polytope. It is kept, since a job may accept many regions."""
+def _sampled_proposal(scene_id: str, job_id: str) -> SampledProposal:
+    """Returns what the job grows its regions from, sampled. It is kept, since a job may accept many regions."""
 
     def read() -> GrowthState:
         with database().read() as session:
             return _known(session, job_id)
 
     start = persistently(read).start
-    return None if start is None else SampledProposal.of(load_scene(scene_id), start.rows)
+    assert start is not None, "the job has a proposal"
+    return SampledProposal.of(load_scene(scene_id), start.rows)
 
 
 def _known(session: Session, job_id: str) -> GrowthState:

@@ -19,9 +19,10 @@ import psycopg
 import pytest
 import redis
 
+from certifier.orphans import die_with_parent
 from db import migrate
 from db.session import Database
-from workers.processes import die_with_parent, queue_server_command, queue_url
+from workers.processes import queue_server_command, queue_url
 
 START_SECONDS = 20.0
 

@@ -31,6 +31,7 @@ def main() -> None:
     from celery.utils.log import get_multiprocessing_logger
 
     from certifier.isolation.child import prepare
+    from certifier.orphans import die_with_parent
     from db import logs, traces
     from db.session import database
     from db.settings import settings
@@ -38,7 +39,7 @@ def main() -> None:
     from workers.app import CONTROL, SOLVE, celery_app
     from workers.heartbeat import Heartbeat
     from workers.presence import Presence
-    from workers.processes import die_with_parent, give_way
+    from workers.processes import give_way
     from workers.tasks import register
     from workers.troubles import Troubles
 

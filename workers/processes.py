@@ -1,37 +1,17 @@
-"""These functions keep child processes from outliving their parent and from slowing others down, and name the private queue server."""
+"""These functions keep processes from slowing others down, and name the private queue server."""
 
 from __future__ import annotations
 
-import ctypes
 import os
 import shutil
-import signal
-import sys
 from contextlib import suppress
 from pathlib import Path
 
-_PR_SET_PDEATHSIG = 1
 NICENESS = 10
 """A process with this niceness gets about a tenth of what another one gets of a core that both want.
 
 That is so little that the API answers at once, and enough for the process to go on.
 """
-
-
-def die_with_parent(sig: int = signal.SIGKILL, parent: int | None = None) -> None:
-    """Makes the kernel send this process a signal when its parent dies (Linux only; elsewhere nothing happens).
-
-    A script's background processes inherit that SIGINT is ignored. The signal ends the process even then.
-
-    Args:
-        parent: the process that forked this one; if it has died before this call, the signal comes at once. None: do not look.
-    """
-    if sig != signal.SIGKILL:
-        signal.signal(sig, signal.SIG_DFL)
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, sig)
-        if parent is not None and os.getppid() != parent:
-            os.kill(os.getpid(), sig)
 
 
 def give_way(*children: int) -> None:

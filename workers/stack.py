@@ -38,12 +38,13 @@ from types import FrameType
 from typing import IO
 
 from certifier.errors import CirisError
+from certifier.orphans import die_with_parent
 from db import keys, leases, logs, migrate, workers
 from db.disk import Disk, lacks_room
 from db.session import UNAVAILABLE, Database
 from db.settings import Settings
 from db.vault import kept_key
-from workers.processes import die_with_parent, queue_server_command, queue_url
+from workers.processes import queue_server_command, queue_url
 from workers.reaper import Reaper
 
 log = logging.getLogger(__name__)

@@ -35,7 +35,8 @@ class Certify:
 
     Attributes:
         iteration: number of this certification within the job, from 0.
-        label: what it is for: ``given`` or ``cells``; ``contract``, ``push`` or ``round`` for the papers' algorithm.
+        label: what it is for: ``given``, ``box`` (a box about the seed) or ``cells``; for the papers' algorithm ``contract``, ``push``
+            or ``round``.
         polytope: its rows include the joint limits.
         center: (n,) interior point; None for the Chebyshev centre.
         pairs: indices into ``scene.pairs`` to certify, those most likely to fail first.

@@ -1,5 +1,7 @@
 """A region is grown by a pure state machine: propose, certify the proposal and cut off what cannot be certified, move the faces out.
 
+Before the proposal, a box about the seed is certified (:mod:`certifier.growth.nearby`).
+
 :func:`begin` and :func:`advance` decide what to do next and compute nothing heavy. The caller (the service's coordinator, or
 :mod:`certifier.jobs.local`) carries out the action and reports back.
 
@@ -18,6 +20,7 @@ from certifier import stored
 from certifier.errors import RegionError
 from certifier.growth.actions import Candidate, Certify, Failed, Finish, Outcomes, Propose, Report, Transition
 from certifier.growth.again import begin_again
+from certifier.growth.nearby import nearby
 from certifier.growth.options import GrowthOptions
 from certifier.growth.pairs import by_joints
 from certifier.growth.paper import machine as papers
@@ -25,11 +28,12 @@ from certifier.growth.paper.rounds import certify_step
 from certifier.growth.paper.state import PaperState
 from certifier.growth.refusal import ended_by
 from certifier.growth.state import Best, GrowthState, Start
-from certifier.growth.whole import after_cells, begin_whole, keeps_more
+from certifier.growth.whole import SLICE, after_cells, begin_whole, keeps_more
 from certifier.model import Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
 from certifier.polytopes.polytope import chebyshev_center
+from certifier.polytopes.proved import ProvedBox
 from certifier.positions import check_magnitude
 from certifier.seeding.options import IRIS_SEEDS
 from certifier.seeding.proposal import Proposal
@@ -45,7 +49,17 @@ def begin(scene: Scene, options: GrowthOptions) -> Transition:
     return _FIRST[options.kind](scene, state)
 
 
-def _propose(scene: Scene, state: GrowthState) -> Transition:
+def _grow(scene: Scene, state: GrowthState) -> Transition:
+    box = None if isinstance(state, PaperState) else nearby(scene, state.options.seed)
+    if box is None:
+        return _propose(state)
+    polytope, seed = box
+    proved, work = ProvedBox.of_program(scene, polytope), by_joints(scene)
+    action = Certify(0, NEARBY, polytope, seed, work, reuse={}, hard=[], failures=None, cells=SLICE, box=proved)
+    return Transition(replace(state, next=1), action)
+
+
+def _propose(state: GrowthState) -> Transition:
     options, seed = state.options, state.options.seed.get("random_seed")
     return Transition(state, Propose({**options.seed, "random_seed": options.random_seed % IRIS_SEEDS if seed is None else seed}))
 
@@ -59,11 +73,13 @@ def _given(scene: Scene, state: GrowthState) -> Transition:
     if center is not None:
         check_magnitude(center, "polytope.center")
         center = np.array(center)
-    action = Certify(0, "given", limited, center, by_joints(scene), reuse={}, hard=[], failures=None, cells=options.cells or 1)
+    action = Certify(0, GIVEN, limited, center, by_joints(scene), reuse={}, hard=[], failures=None, cells=options.cells or 1)
     return Transition(replace(state, next=1), action)
 
 
-_FIRST = {"grow": _propose, "certify": _given, "recertify": begin_again}
+GIVEN, NEARBY = "given", "box"
+"""The labels of certifying a given polytope, and a box about the seed."""
+_FIRST = {"grow": _grow, "certify": _given, "recertify": begin_again}
 """kind of the job -> what its first transition is"""
 
 
@@ -124,9 +140,11 @@ def _proposed(scene: Scene, state: GrowthState, proposal: Proposal) -> Transitio
 
 def _certified(scene: Scene, state: GrowthState, report: Outcomes) -> Transition:
     action = report.action
-    if action.label == "given":
+    if action.label == GIVEN:
         candidate = _candidate(state, report, None) if report.complete else None
         return Transition(state, Finish(combine(list(report.outcomes.values())), "the given polytope, every pair"), candidate)
+    if action.label == NEARBY:
+        return _begun(state, report)
     start = state.start
     assert start is not None, "what is certified comes from a proposal"
     candidate = None
@@ -141,6 +159,17 @@ def _certified(scene: Scene, state: GrowthState, report: Outcomes) -> Transition
     return replace(after_cells(scene, state, start, report), candidate=candidate)
 
 
+def _begun(state: GrowthState, report: Outcomes) -> Transition:
+    """Asks for the proposal, with the box about the seed as the best region so far where it is certified."""
+    action = report.action
+    if not report.complete:
+        return _propose(state)
+    assert action.center is not None
+    volume = inscribed_ellipsoid(action.polytope).volume
+    state = replace(state, best=Best(action.iteration, action.polytope, action.center, volume))
+    return replace(_propose(state), candidate=_candidate(state, report, volume))
+
+
 def _better(scene: Scene, state: GrowthState, start: Start, action: Certify, volume: float, best: Best) -> bool:
     """Returns whether a certified polytope is better than the best so far, by what the way to grow makes larger.
 
@@ -152,6 +181,7 @@ def _better(scene: Scene, state: GrowthState, start: Start, action: Certify, vol
 
 
 def _candidate(state: GrowthState, report: Outcomes, volume: float | None) -> Candidate:
-    action, seed = report.action, None if state.start is None else state.start.seed
+    action = report.action
+    seed = action.center if action.label == NEARBY else None if state.start is None else state.start.seed
     proofs = {**dict.fromkeys(action.pairs, action.iteration), **action.reuse}
     return Candidate(action.iteration, action.polytope, action.center, seed, volume, proofs, action.together, state.obstacles)

@@ -62,7 +62,7 @@ class Whole:
         spent: pair index -> how many cells were looked at.
         cuts: pair index -> in how many rounds something was cut off for it; pairs without a cut are left out.
         since, passed: the shares of the time until the deadline that had passed when this stage began, and now; 0 without a deadline.
-        stage: the number of the stage, from 1 on; 0 for a box about the seed.
+        stage: the number of the stage, from 1 on.
         together: pair index -> the other pairs that share its certificate.
     """
 

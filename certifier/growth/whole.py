@@ -7,8 +7,6 @@ spent, all cells that are still open are cut off as well.
 The first region comes from a smaller copy of the proposal about the seed, so there is a certified region early. In every further stage
 the faces of the region move out, as far as the proposal, and what is between is certified in the same way. The faces that were found
 where cells are cheap show where the next faces have to be. This takes a fraction of the cells that the proposal itself would take.
-
-Where the seed is in a narrow place, a box about it comes before all that (certifier.growth.nearby).
 """
 
 from __future__ import annotations
@@ -18,7 +16,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from certifier.growth.actions import Certify, Finish, Outcomes, Transition
-from certifier.growth.nearby import nearby
 from certifier.growth.obstacles import Obstacle, joined
 from certifier.growth.options import MOST_CELLS
 from certifier.growth.pairs import by_joints, joints_between
@@ -74,17 +71,11 @@ EARLY_EFFORT = 24 * SLICE
 
 
 def begin_whole(scene: Scene, state: GrowthState, start: Start) -> Transition:
-    """Asks to certify a box about a seed in a narrow place, as stage 0, or else begins with stage 1."""
-    box = nearby(scene, start)
-    return _first_stage(scene, state, start) if box is None else begin_stage(scene, state, FIRST, box, stage=0)
-
-
-def _first_stage(scene: Scene, state: GrowthState, start: Start, passed: float = 0.0) -> Transition:
     """Asks to certify a smaller copy of the proposal, or all of it where the copy does not contain all points to keep."""
     copy = _copy(scene, start, FIRST)
     if (start.keep @ copy.C.T < copy.d).all():
-        return begin_stage(scene, state, FIRST, copy, passed=passed)
-    return begin_stage(scene, state, 1.0, _copy(scene, start, 1.0), passed=passed)
+        return begin_stage(scene, state, FIRST, copy)
+    return begin_stage(scene, state, 1.0, _copy(scene, start, 1.0))
 
 
 def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
@@ -92,8 +83,6 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
     whole, best = state.whole, state.best
     assert whole is not None
     assert best is not None
-    if whole.stage == 0:
-        return _first_stage(scene, state, start, whole.passed)
     kept = _kept(scene, start, best.polytope)
     if start.again:
         return Transition(state, Finish(Outcome.CERTIFIED, f"certified; {100 * kept:.3g} % of the region is kept"))

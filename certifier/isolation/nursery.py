@@ -7,7 +7,6 @@ closed, the nursery ends, and its child with it.
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import importlib
 import json
@@ -27,8 +26,8 @@ from typing import Any
 from certifier.errors import CirisError
 from certifier.isolation import telling
 from certifier.isolation.child import ERRORS, KEEP, LOADED, STATUS, TOLD, decode, encode
+from certifier.orphans import die_with_parent
 
-_PR_SET_PDEATHSIG = 1
 _MOST_WRITTEN = 2**28
 """A child may write this many bytes of its answer, and of any file, its log among them."""
 _CHUNK = 2**16
@@ -87,20 +86,13 @@ def _ending_with(connection: Connection) -> Iterator[None]:
 def _ending_with_parent() -> Iterator[None]:
     """Ends this process at once when its parent dies while the block runs, which may compile for a minute.
 
-    Linux' signal comes even while native code keeps Python's threads waiting. But it comes when the *thread* ends that started the process.
-    That one waits while the nursery loads, and may be gone later.
+    The thread that started this process waits while the nursery loads, and may be gone later.
     """
-    _signal_at_death_of_parent(signal.SIGKILL)
+    die_with_parent()
     try:
         yield
     finally:
-        _signal_at_death_of_parent(0)
-
-
-def _signal_at_death_of_parent(number: int) -> None:
-    """Asks Linux for a signal when the thread ends that started this process; 0 for none. Elsewhere nothing happens."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
+        die_with_parent(0)
 
 
 def _keep(module: ModuleType, name: str, text: str, gone: list[str]) -> None:
@@ -178,9 +170,7 @@ def _confine(memory_bytes: int, nursery: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))
     resource.setrlimit(resource.RLIMIT_FSIZE, (_MOST_WRITTEN, _MOST_WRITTEN))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    _signal_at_death_of_parent(signal.SIGKILL)
-    if os.getppid() != nursery:
-        os.kill(os.getpid(), signal.SIGKILL)
+    die_with_parent(parent=nursery)
 
 
 if __name__ == "__main__":

@@ -70,7 +70,7 @@ class _Memory:
         made: the candidate that a region was made of last; None before there is one.
         last: this region.
         rests_until: no region but the last one is made before this many seconds of the job.
-        proposal: what the region is grown from; None before there is a candidate.
+        proposal: what regions are grown from; None before one is made of it.
         told: what the child process that makes the proposal has told last.
     """
 
@@ -131,9 +131,10 @@ class _Memory:
         self.state, self.action = decision.state, decision.action
         if decision.candidate is not None:
             self._accept(decision.candidate)
-        if isinstance(self.action, Finish):
+        out_of_time = isinstance(turn.report, Failed) and turn.report.error.code == "child_timeout"
+        if isinstance(self.action, Finish) and not out_of_time:
             return False
-        if self.passed >= 1:
+        if self.passed >= 1 or out_of_time:
             self.action = late(self.scene, self.state, self.candidate is not None, self.told)
             return False
         if self.deliver is not None and self.candidate is not self.made and self.seconds >= self.rests_until:
@@ -141,8 +142,6 @@ class _Memory:
         return True
 
     def _accept(self, candidate: Candidate) -> None:
-        if self.proposal is None and self.state is not None and self.state.start is not None:
-            self.proposal = SampledProposal.of(self.scene, self.state.start.rows)
         self.certified.append(Certified(candidate.iteration, candidate.polytope, candidate.ellipsoid_volume, self.seconds))
         self.candidate = candidate
 
@@ -151,6 +150,8 @@ class _Memory:
         assert self.candidate is not None, "a region is made of a certified polytope"
         assert self.state is not None
         begun = self.seconds
+        if self.proposal is None and self.state.start is not None:
+            self.proposal = SampledProposal.of(self.scene, self.state.start.rows)
         spent = sum(result.seconds for found in self.results.values() for parts in found.values() for result in parts)
         account = Account(self.certified, self.seeding_seconds, spent, self.seconds)
         self.tell("step", {"kind": "accept", "state": "running", "seconds": None})
@@ -208,7 +209,7 @@ class _Memory:
         except CirisError as error:
             if error.code != "child_timeout":
                 raise
-            finish = late(self.scene, self.state, False, self.told)
+            finish = late(self.scene, self.state, self.candidate is not None, self.told)
             raise refused(finish, None) or error from None
 
     def _certify(self, action: Certify) -> Outcomes:

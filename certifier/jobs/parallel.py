@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
 from collections.abc import Callable, Generator, Hashable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -10,6 +11,7 @@ from concurrent.futures.process import BrokenProcessPool
 
 from certifier.errors import CirisError
 from certifier.jobs.pairs import CertifyPart
+from certifier.orphans import die_with_parent
 from certifier.pair.result import PairResult
 
 Asked = tuple[int, int]
@@ -35,7 +37,7 @@ def side_by_side(certify: CertifyPart, asked: Sequence[Asked], processes: int, k
     for index, part in asked:
         tasks.setdefault((kind(index), part), []).append((index, part))
     # The children are forked, so they have what the pairs share, and what earlier rounds left, without preparing it.
-    with ProcessPoolExecutor(min(processes, len(tasks)), multiprocessing.get_context("fork"), _adopt, (certify,)) as executor:
+    with ProcessPoolExecutor(min(processes, len(tasks)), multiprocessing.get_context("fork"), _adopt, (certify, os.getpid())) as executor:
         try:
             found: dict[Asked, PairResult] = {}
             done = zip(tasks.values(), executor.map(_run, tasks.values()), strict=True)
@@ -54,7 +56,8 @@ _adopted: list[CertifyPart] = []
 """This holds the function of the parent of this process, so that it need not travel to it."""
 
 
-def _adopt(certify: CertifyPart) -> None:
+def _adopt(certify: CertifyPart, parent: int) -> None:
+    die_with_parent(parent=parent)  # the children hold one another's pipes open, so none of these would end
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # a terminal interrupts children too, and they have nothing to say about it
     _adopted.append(certify)
 

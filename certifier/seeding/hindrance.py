@@ -34,6 +34,11 @@ def hindrance(scene: Scene, checked: Sequence[Nearest]) -> str:
     tight = min(checked, key=lambda one: round(one.distance, 6), default=None)
     if tight is not None and tight.pair is not None and tight.distance <= NEAR:
         return _next_to_contact(scene, tight)
+    return too_long(scene)
+
+
+def too_long(scene: Scene) -> str:
+    """Returns which slide is far longer than the robot; "" where none is."""
     size = max((float(np.ptp(g.vertices, axis=0).max()) + 2 * g.radius for g in scene.geometries), default=0.0)
     for joint, length in zip(scene.moving, scene.q_upper - scene.q_lower, strict=True):
         if joint.kind is JointKind.PRISMATIC and length > LONG * size:

@@ -45,6 +45,11 @@ BESIDE = 2
 BESIDE_ITERATIONS = 2
 """At most this many alternations follow each choice."""
 
+AGAIN, LEAST_KEPT = 3, 0.6
+"""Where the ellipsoid in the region is narrower by this factor than one of the alternations, everything is tried again with other random
+numbers, AGAIN times at most in all. Then what collides lies between the seed and most of the polytope, or next to the seed, and cutting it
+off has left a sliver."""
+
 
 def iris(scene: Scene, points: Array, options: SeedOptions) -> tuple[Array, Array, dict[str, Any]]:
     """Returns the faces (m, n), (m,) of an IRIS region around points of s, and an account.
@@ -62,24 +67,59 @@ def iris(scene: Scene, points: Array, options: SeedOptions) -> tuple[Array, Arra
         RegionError: as :func:`certifier.polytopes.ellipsoid.inscribed_ellipsoid`.
     """
     rng = np.random.default_rng(options.random_seed or 0)
+    best: _Found | None = None
+    for _ in range(AGAIN):
+        found = _found(scene, points, options, rng)
+        if best is None or found.ellipsoid.volume > best.ellipsoid.volume:
+            best = found
+        if best.kept >= LEAST_KEPT:
+            break
+    assert best is not None, "there is a first time"
+    turn, polytope, passed = best.turn, best.polytope, best.passed
+    C, d = needed_faces(scene, polytope.C[: -2 * scene.n], polytope.d[: -2 * scene.n], points)
+    guarantee = Guarantee.SAMPLED if passed else Guarantee.NONE
+    warnings = [] if passed else [f"more than {options.epsilon:g} of the polytope may collide: too many faces would be needed"]
+    account = {"guarantee": guarantee, "termination": turn.termination, "iterations": turn.iterations, "warnings": warnings}
+    return C, d, {"epsilon": options.epsilon, "delta": options.delta, **account}
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """Holds a region.
+
+    Attributes:
+        turn: the last of the alternations.
+        polytope: what is left of its polytope, with the largest ellipsoid inside.
+        passed: as :func:`certifier.seeding.trim.trimmed` says.
+        kept: how wide this ellipsoid is, as a part of the widest one of the alternations, in the mean over all directions.
+    """
+
+    turn: _Turn
+    polytope: Polytope
+    passed: bool
+    ellipsoid: Ellipsoid
+    kept: float
+
+
+def _found(scene: Scene, points: Array, options: SeedOptions, rng: np.random.Generator) -> _Found:
+    """Alternates between faces and ellipsoid, and cuts off the corners that collide."""
     contacts, limits = Contacts(scene), scene.polytope([], [])
     samples = hit_and_run(limits, points[0], SAMPLES, int(rng.integers(2**31)))
     few = min(MOST, FEW * float((~contacts.free(samples)).mean()))
     start = _Turn(limits, Ellipsoid(points[0], START_RADIUS * np.eye(scene.n)), 0)
-    found = _alternated(contacts, points, start, few, options.max_iterations, options, rng)
+    turn = _alternated(contacts, points, start, few, options.max_iterations, options, rng)
+    widest = turn.ellipsoid.volume
     for _ in range(BESIDE):
-        coarse = coarse_pairs_of(scene, found.polytope, points)
+        coarse = coarse_pairs_of(scene, turn.polytope, points)
         if not coarse:
             break
-        begin = _Turn(found.polytope, found.ellipsoid, found.iterations)
+        begin = _Turn(turn.polytope, turn.ellipsoid, turn.iterations)
         contacts = Contacts(with_coarse_pairs(scene, coarse))
-        found = _alternated(contacts, points, begin, few, BESIDE_ITERATIONS, options, rng)
-    polytope, passed = trimmed(scene, found.polytope, points, options, rng)
-    C, d = needed_faces(scene, polytope.C[: -2 * scene.n], polytope.d[: -2 * scene.n], points)
-    guarantee = Guarantee.SAMPLED if passed else Guarantee.NONE
-    warnings = [] if passed else [f"more than {options.epsilon:g} of the polytope may collide: too many faces would be needed"]
-    account = {"guarantee": guarantee, "termination": found.termination, "iterations": found.iterations, "warnings": warnings}
-    return C, d, {"epsilon": options.epsilon, "delta": options.delta, **account}
+        turn = _alternated(contacts, points, begin, few, BESIDE_ITERATIONS, options, rng)
+        widest = max(widest, turn.ellipsoid.volume)
+    polytope, passed = trimmed(scene, turn.polytope, points, options, rng)
+    ellipsoid = inscribed_ellipsoid(polytope)
+    return _Found(turn, polytope, passed, ellipsoid, float((ellipsoid.volume / widest) ** (1 / scene.n)))
 
 
 @dataclass(frozen=True, eq=False)

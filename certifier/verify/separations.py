@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import multiprocessing
+import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -17,6 +18,7 @@ import numpy as np
 
 from certifier.errors import ProofError
 from certifier.model import Scene, Volume
+from certifier.orphans import die_with_parent
 from certifier.proof.pair import PairProof
 from certifier.proof.partition import PartitionProof
 from certifier.proof.separation import Separation
@@ -160,7 +162,7 @@ def _results(check: _Check, processes: int) -> Iterator[tuple[Part, float]]:
         for part in check.parts():
             yield part, check.gap(part)
         return
-    executor = ProcessPoolExecutor(processes, multiprocessing.get_context("fork"), _adopt, (check,))
+    executor = ProcessPoolExecutor(processes, multiprocessing.get_context("fork"), _adopt, (check, os.getpid()))
     waiting: deque[tuple[Part, Future[float | dict[str, str | None]]]] = deque()
     try:
         parts, wrong = check.parts(), None
@@ -187,7 +189,8 @@ _adopted: list[_Check] = []
 """This holds what the parent of this process checks, so that a part alone travels to it."""
 
 
-def _adopt(check: _Check) -> None:
+def _adopt(check: _Check, parent: int) -> None:
+    die_with_parent(parent=parent)  # the children hold one another's pipes open, so none of these would end
     _adopted.append(check)
 
 

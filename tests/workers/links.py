@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from certifier.orphans import die_with_parent
 from tests.workers.service import ROOT
-from workers.processes import die_with_parent
 
 NETWORK = "10.213.{machine}.{host}"
 """In use nowhere else, one hopes."""

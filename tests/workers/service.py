@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 import pytest
 
 from certifier.model import Scene
+from certifier.orphans import die_with_parent
 from db import events, jobs, scenes
 from db.models import EventRow, JobRow, PairRow
 from db.session import database
@@ -24,7 +25,6 @@ from db.settings import settings
 from db.states import JOB, unfinished
 from tests.db.builders import all_pairs
 from workers.app import celery_app, send_coordinate
-from workers.processes import die_with_parent
 
 ROOT = Path(__file__).parents[2]
 PATIENCE_SECONDS = 180.0

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from certifier.orphans import die_with_parent
 from tests.services import Queue
 from tests.workers.service import ROOT, environment, eventually
 from workers.app import SOLVE, celery_app, send_work, waiting
-from workers.processes import die_with_parent
 
 SLOW = """
 import os, sys, time

@@ -15,6 +15,7 @@ import pytest
 import redis
 
 from certifier.model import Scene
+from certifier.orphans import die_with_parent
 from db import migrate
 from tests.services import free_port, postgres_server
 from tests.workers import links
@@ -22,7 +23,7 @@ from tests.workers.links import DATABASE, REDIS, Machine
 from tests.workers.options import box_around, grow_box
 from tests.workers.record import check_record, region_of
 from tests.workers.service import PATIENCE_SECONDS, Service, ended, environment, events_of, eventually, job_of, pairs_of, submit
-from workers.processes import die_with_parent, queue_server_command
+from workers.processes import queue_server_command
 
 pytestmark = pytest.mark.slow
 

@@ -22,11 +22,11 @@ import yaml
 
 from api.metrics import METHODS, STATUSES
 from certifier.errors import CirisError
+from certifier.orphans import die_with_parent
 from certifier.scene import pack_bundle
 from db.leases import _started
 from db.settings import Settings
 from tests.workers.service import ROOT, eventually
-from workers.processes import die_with_parent
 from workers.stack import Child, _data_directory, _reserved_port
 
 COMMAND = [sys.executable, "-m", "workers.stack"]

@@ -105,7 +105,7 @@ def test_points_that_cannot_be_contained_together_are_refused():
 )
 def test_the_random_seed_is_that_of_iris_too_unless_the_seed_has_its_own(growth, iris, expected):
     """A growth takes larger ones than IRIS does."""
-    seed = {"q": [0.1, 0.2], **({} if iris is None else {"random_seed": iris})}
+    seed = {"q": [0.1, 0.2], "contain": [[0.9, 0.1]], **({} if iris is None else {"random_seed": iris})}
     action = begin(planar_arm(), GrowthOptions.from_document({"kind": "grow", "seed": seed, "random_seed": growth})).action
     assert isinstance(action, Propose)
     assert SeedOptions.from_document(action.seed).random_seed == expected

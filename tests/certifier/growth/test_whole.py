@@ -441,7 +441,7 @@ def test_a_child_that_dies_leaves_the_region_before(monkeypatch):
     certifier = local.part_certifier
 
     def dying(scene, action, *others):
-        in_the_second_stage = action.iteration > 0 and action.begun is None
+        in_the_second_stage = action.iteration > 1 and action.begun is None
         return (lambda index, part: os._exit(1)) if in_the_second_stage else certifier(scene, action, *others)
 
     monkeypatch.setattr(local, "part_certifier", dying)

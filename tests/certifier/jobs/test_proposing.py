@@ -16,7 +16,8 @@ from certifier.seeding.proposal import NO_ROOM
 from tests.certifier.scenes import planar_arm
 
 SEED = [0.0, 0.0]
-GROW = GrowthOptions(seed={"q": SEED})
+GROW = GrowthOptions(seed={"q": SEED, "contain": [[0.5, 0.0]]})
+"""The box about the seed does not contain the other configuration, so there is no region before the proposal."""
 
 
 def test_a_growth_says_for_how_long_it_proposes_and_how_many_faces_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
