@@ -18,8 +18,7 @@ from certifier.errors import RegionError
 from certifier.model import Array, Polytope, Scene
 from certifier.motion.bodies import bodies_of
 from certifier.motion.views import moved
-from certifier.seeding.hindrance import too_long
-from certifier.seeding.limits import check_limits, off_limits
+from certifier.seeding.limits import check_limits, off_limits, too_long
 
 PART = 0.9
 """In the box, every two bodies come nearer to each other by at most this part of their distance at the seed."""

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from certifier.model import JointKind, Scene
+from certifier.model import Scene
 from certifier.seeding.free import Clearance, Nearest, named, nearest_free, written
-from certifier.seeding.proposal import NO_ROOM, TOO_LONG
+from certifier.seeding.limits import too_long
+from certifier.seeding.proposal import NO_ROOM
 
 NEAR = 5e-3
 """A seed that is nearer to contact than this, in metres, is next to it."""
@@ -20,8 +19,6 @@ ROOM = (20e-3, 10e-3, 5e-3)
 """Such a seed has a neighbour named where every pair has the first of these distances, in metres, that is found within reach."""
 REACH = 0.3
 """The neighbour is within this part of the joints' half ranges."""
-LONG = 100.0
-"""A slide is too long for the scene if it goes this many times as far as the largest body is wide."""
 
 
 def hindrance(scene: Scene, checked: Sequence[Nearest]) -> str:
@@ -35,15 +32,6 @@ def hindrance(scene: Scene, checked: Sequence[Nearest]) -> str:
     if tight is not None and tight.pair is not None and tight.distance <= NEAR:
         return _next_to_contact(scene, tight)
     return too_long(scene)
-
-
-def too_long(scene: Scene) -> str:
-    """Returns which slide is far longer than the robot; "" where none is."""
-    size = max((float(np.ptp(g.vertices, axis=0).max()) + 2 * g.radius for g in scene.geometries), default=0.0)
-    for joint, length in zip(scene.moving, scene.q_upper - scene.q_lower, strict=True):
-        if joint.kind is JointKind.PRISMATIC and length > LONG * size:
-            return f"joint {joint.name} slides {length:.3g} m, and the largest body is {size:.3g} m wide{TOO_LONG}"
-    return ""
 
 
 def _next_to_contact(scene: Scene, tight: Nearest) -> str:

@@ -89,7 +89,7 @@ class _Found:
 
     Attributes:
         turn: the last of the alternations.
-        polytope: what is left of its polytope, with the largest ellipsoid inside.
+        polytope: the part of its polytope that faces leave, with the largest ellipsoid inside.
         passed: as :func:`certifier.seeding.trim.trimmed` says.
         kept: how wide this ellipsoid is, as a part of the widest one of the alternations, in the mean over all directions.
     """

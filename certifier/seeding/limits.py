@@ -6,12 +6,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from certifier.errors import RegionError
-from certifier.model import Array, Scene
+from certifier.model import Array, JointKind, Scene
+from certifier.seeding.proposal import TOO_LONG
 
 ON = 1e-9
 """A position so near to a limit, in radians or metres, is on it: nobody types such a distance."""
 HAIR = 1e-4
 """A position on a limit is moved inside by so much, in radians or metres."""
+LONG = 100.0
+"""A slide is too long for the scene if it goes this many times as far as the largest body is wide."""
 
 
 def check_limits(scene: Scene, q: ArrayLike, field: str = "seed") -> None:
@@ -42,3 +45,12 @@ def off_limits(scene: Scene, q: ArrayLike) -> Array:
     hair = np.minimum(HAIR, (scene.q_upper - scene.q_lower) / 4)
     low, high = shifted <= scene.q_lower + ON, shifted >= scene.q_upper - ON
     return np.where(low, scene.q_lower + hair, np.where(high, scene.q_upper - hair, values))
+
+
+def too_long(scene: Scene) -> str:
+    """Returns which slide is far longer than the robot; "" where none is."""
+    size = max((float(np.ptp(g.vertices, axis=0).max()) + 2 * g.radius for g in scene.geometries), default=0.0)
+    for joint, length in zip(scene.moving, scene.q_upper - scene.q_lower, strict=True):
+        if joint.kind is JointKind.PRISMATIC and length > LONG * size:
+            return f"joint {joint.name} slides {length:.3g} m, and the largest body is {size:.3g} m wide{TOO_LONG}"
+    return ""

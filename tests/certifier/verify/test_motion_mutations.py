@@ -9,7 +9,7 @@ from certifier.verify.sides import Sides
 from tests.certifier.verify.fuzz_motion import Campaign, case
 from tests.certifier.verify.motion_mutations import KINDS, changed_bytes, changed_meaning, valid
 from tests.certifier.verify.motion_oracle import MotionFile
-from tests.certifier.verify.test_rounding import far_proof
+from tests.certifier.verify.test_rounding import far_files
 
 FEW = 40
 LONG_CAMPAIGN = 10_000
@@ -71,8 +71,10 @@ def test_the_oracle_finds_what_a_verifier_without_a_bound_of_accelerations_would
 
 
 def test_the_oracle_finds_an_overlap_that_only_rounding_hides(monkeypatch):
-    """2e-10 m deep, with a body's frame a million metres off its joint."""
+    """2e-10 m deep, with a body's frame a million metres off its joint. Processors round sums differently, so not every one hides it."""
     monkeypatch.setattr(Sides, "sizes", lambda self, slid: np.full(len(slid), 1.0))
-    wrong = Campaign().judge("far", far_proof())
-    assert wrong is not None
-    assert "apart at most" in wrong
+    campaign = Campaign()
+    wrong = [found for data in far_files() if (found := campaign.judge("far", data))]
+    print(len(wrong), campaign)
+    assert wrong
+    assert all("apart at most" in found for found in wrong)

@@ -192,10 +192,9 @@ def far_proofs(seeds) -> Iterator[MotionProof]:
         yield MotionProof(scene, rest, 1.0, 0.0, np.zeros(1, np.int32), one, ends, np.array([[1.0, 0.0, 0.0]]))
 
 
-def far_proof() -> bytes:
-    """The file of one of them."""
-    proof = next(far_proofs(range(200)))
-    return with_scene(proof.to_bytes(), proof.scene)
+def far_files() -> Iterator[bytes]:
+    """Their files."""
+    return (with_scene(proof.to_bytes(), proof.scene) for proof in far_proofs(range(1000)))
 
 
 def test_bodies_that_overlap_by_what_a_far_frame_rounds_are_not_apart():
