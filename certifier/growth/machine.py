@@ -166,7 +166,7 @@ def _begun(state: GrowthState, report: Outcomes) -> Transition:
         return _propose(state)
     assert action.center is not None
     volume = inscribed_ellipsoid(action.polytope).volume
-    state = replace(state, best=Best(action.iteration, action.polytope, action.center, volume))
+    state = replace(state, best=Best(action.iteration, action.polytope, action.center, volume, box=True))
     return replace(_propose(state), candidate=_candidate(state, report, volume))
 
 

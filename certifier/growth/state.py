@@ -38,12 +38,14 @@ class Best:
     Attributes:
         iteration: the one that completed it.
         center: (n,) a point inside.
+        box: whether it is the box about the seed, which is certified before there is a proposal.
     """
 
     iteration: int
     polytope: Polytope
     center: Array
     ellipsoid_volume: float
+    box: bool = False
 
 
 @dataclass(frozen=True, eq=False)

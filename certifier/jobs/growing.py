@@ -43,7 +43,8 @@ def late(scene: Scene, state: GrowthState | None, certified: bool, told: dict[st
         told: what the child process that makes the proposal has told last.
     """
     if certified:
-        return Finish(Outcome.CERTIFIED, DEADLINE)
+        box = state is not None and state.best is not None and state.best.box
+        return Finish(Outcome.CERTIFIED, f"{DEADLINE}; the region is a small box about the seed" if box else DEADLINE)
     return Finish(Outcome.INCONCLUSIVE, at_deadline(scene, state, told.get("hindrance", "")))
 
 

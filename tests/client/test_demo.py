@@ -11,31 +11,36 @@ import pytest
 
 from certifier.errors import CirisError
 from certifier.growth.refusal import DEADLINE
-from client import demo
+from client import demo, service
 from tests.client.conftest import PLANAR, surroundings
 
 SCRIPT = f"import sys, pathlib, client.demo as demo; demo.SCENE = pathlib.Path({str(PLANAR)!r}); sys.exit(demo.main(['--once']))"
 
 
 def test_a_busy_machine_gets_more_time_before_it_is_told_to_come_back(monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    region, box = (service.Grown({"share": share}, b"", 1.0) for share in ({"value": 0.4}, None))
     asked: list[float] = []
+    answers: list[service.Grown | None] = []
 
-    def grow(client: Any, request: dict[str, Any], screen: Any, idempotency_key: str) -> str:
+    def grow(client: Any, request: dict[str, Any], screen: Any, idempotency_key: str) -> service.Grown:
         asked.append(request["deadline_seconds"])
-        if len(asked) <= late:
+        if (answer := answers.pop(0)) is None:
             raise CirisError("not_grown", f"{DEADLINE}; a and b were in the way of a region in 2 rounds")
-        return "a region"
+        return answer
 
     monkeypatch.setattr(demo.service, "grow", grow)
-    late = 1
-    assert demo._grown(None, {}) == "a region"
-    assert asked == [120, 1200]
-    assert "no region was certified within 120 s" in capsys.readouterr().out
-    asked.clear()
-    late = 2
+    for first in (None, box):
+        answers[:] = [first, region]
+        assert demo._grown(None, {}) is region
+        assert "no region but a box about the seed was certified within 120 s" in capsys.readouterr().out
+    answers[:] = [box, box]
+    assert demo._grown(None, {}) is box
+    answers[:] = [None, None]
     with pytest.raises(CirisError, match="too busy for a first region"):
         demo._grown(None, {})
-    assert asked == [120, 1200]
+    assert asked == [120, 1200] * 4
+    answers[:] = [region]
+    assert demo._grown(None, {}) is region
 
 
 @pytest.mark.slow
