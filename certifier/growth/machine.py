@@ -29,7 +29,7 @@ from certifier.growth.paper.state import PaperState
 from certifier.growth.refusal import ended_by
 from certifier.growth.state import Best, GrowthState, Start
 from certifier.growth.whole import SLICE, after_cells, begin_whole, keeps_more
-from certifier.model import Polytope, Scene
+from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
 from certifier.polytopes.polytope import chebyshev_center
@@ -141,7 +141,7 @@ def _proposed(scene: Scene, state: GrowthState, proposal: Proposal) -> Transitio
 def _certified(scene: Scene, state: GrowthState, report: Outcomes) -> Transition:
     action = report.action
     if action.label == GIVEN:
-        candidate = _candidate(state, report, None) if report.complete else None
+        candidate = _candidate(state, report, None, None) if report.complete else None
         return Transition(state, Finish(combine(list(report.outcomes.values())), "the given polytope, every pair"), candidate)
     if action.label == NEARBY:
         return _begun(state, report)
@@ -151,7 +151,7 @@ def _certified(scene: Scene, state: GrowthState, report: Outcomes) -> Transition
     if report.complete:
         volume = inscribed_ellipsoid(action.polytope).volume
         if state.best is None or _better(scene, state, start, action, volume, state.best):
-            candidate = _candidate(state, report, volume)
+            candidate = _candidate(state, report, start.seed, volume)
             center = chebyshev_center(action.polytope)[0] if action.center is None else action.center
             state = replace(state, best=Best(action.iteration, action.polytope, center, volume))
     if isinstance(state, PaperState):
@@ -167,7 +167,7 @@ def _begun(state: GrowthState, report: Outcomes) -> Transition:
     assert action.center is not None
     volume = inscribed_ellipsoid(action.polytope).volume
     state = replace(state, best=Best(action.iteration, action.polytope, action.center, volume, box=True))
-    return replace(_propose(state), candidate=_candidate(state, report, volume))
+    return replace(_propose(state), candidate=_candidate(state, report, action.center, volume))
 
 
 def _better(scene: Scene, state: GrowthState, start: Start, action: Certify, volume: float, best: Best) -> bool:
@@ -180,8 +180,7 @@ def _better(scene: Scene, state: GrowthState, start: Start, action: Certify, vol
     return keeps_more(scene, start, action.polytope, best.polytope)
 
 
-def _candidate(state: GrowthState, report: Outcomes, volume: float | None) -> Candidate:
+def _candidate(state: GrowthState, report: Outcomes, seed: Array | None, volume: float | None) -> Candidate:
     action = report.action
-    seed = action.center if action.label == NEARBY else None if state.start is None else state.start.seed
     proofs = {**dict.fromkeys(action.pairs, action.iteration), **action.reuse}
     return Candidate(action.iteration, action.polytope, action.center, seed, volume, proofs, action.together, state.obstacles)
