@@ -139,17 +139,17 @@ class Bodies:
         result = self._prove(cell, plane)
         return Separated(plane, result) if isinstance(result, tuple) else None
 
-    def room(self, cell: Cell, start: Array) -> float:
-        """Returns how much room a plane has on a cell: its margin by the square of the cell's turn; 0 where no plane is found.
-
-        Cells with more room are more often proved at once.
+    def changes(self, cell: Cell, s: Array, joints: Sequence[int]) -> Array:
+        """Returns how much the gap changes when one joint moves across the cell, for each of these joints, (k,).
 
         Args:
-            start: (n,) a point of the polytope in the cell.
+            s: (n,) where the other joints stay, and where the gap is looked at beside both ends.
         """
-        kind, z, *_ = self._look(cell, *self._configurations(cell, start))
-        turn = cell.turn()[self.joints]
-        return float(np.linalg.norm(z) / (turn @ turn)) if kind == planes.FOUND else 0.0
+        X = np.tile(s, (len(joints), 3, 1))
+        for row, joint in zip(X, joints, strict=True):
+            row[0, joint], row[2, joint] = cell.lower[joint], cell.upper[joint]
+        found: Array = np.ptp(gaps(*self.hulls, X.reshape(-1, len(s))).reshape(-1, 3), axis=1)
+        return found
 
     def _configurations(self, cell: Cell, start: Array) -> tuple[Array, int]:
         """Returns the configurations of the cell to look at first, and how many these are; there is room for MORE."""

@@ -10,7 +10,7 @@ A cell goes through these steps (certifier.partition.bodies), each of which send
 
 Coarse volumes (certifier.partition.coarse) come first, on levels (certifier.partition.levels). Where those of a level are not enough, the
 cell is cut in the joints that move them, until it is narrow; then the next level is tried, the bodies themselves at last. Of two chains,
-the next level is tried at once where the volumes touch.
+the next level is tried at once where the volumes touch. A cell is cut in the joint that changes the gap between the bodies most.
 
 The largest cells, by q-volume, come first.
 """
@@ -21,6 +21,7 @@ import heapq
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,14 +44,18 @@ NARROW_COARSE = np.radians(15.0)
 them any more."""
 NARROW_CUT = np.radians(7.0)
 """A cell is not cut for coarse volumes in a joint in which it turns less than this. A joint next to a volume may turn as far as it likes:
-the volume hardly moves for it, and cuts in others would go on for ever. There are two exceptions: volumes that faces separate, and bodies
-of two chains, whose next level has more joints, and far too many cells (docs/trials.md)."""
-FEW_JOINTS, NARROWER = 6, np.radians(30.0)
-"""Where more than FEW_JOINTS move one body against the other, a cell without a sample is cut for them until it turns less than NARROWER."""
-SAVED, MOST_PARTED, NARROW_PARTED = 2, 6, np.radians(3.5)
+the volume hardly moves for it, and cuts in others would go on for ever. Where the next level takes far too many cells, there are
+exceptions: volumes that faces separate, bodies of two chains, and volumes that do not touch, of bodies that MANY_JOINTS or more move
+(docs/trials.md)."""
+NARROWER = np.radians(30.0)
+"""Where MANY_JOINTS or more move one body against the other, a cell without a sample is cut for them until it turns less than NARROWER."""
+NARROW_APART = np.radians(3.5)
+"""Cells are cut until they turn less than this for volumes that faces separate, and for volumes that touch at none of the configurations
+that are looked at, of bodies that MANY_JOINTS or more move."""
+SAVED, MOST_PARTED = 2, 6
 """Where faces are added, and MANY_JOINTS or more move one body against the other, they separate the slimmest level that at most MOST_PARTED
 joints move. Of bodies that are no two chains, it has to save SAVED joints, and to have a coarse volume in the place of one of them only.
-Cells are cut for it until they turn less than NARROW_PARTED."""
+Narrow cells of it stay open: once the faces separate the volumes, the bodies need no cells."""
 ROOM = 0.25
 """At every point that stays inside, the volumes that faces separate are farther apart than this part of the larger radius. Faces between
 nearer ones would have to pass close by the point, and cost most of the polytope."""
@@ -58,9 +63,6 @@ LOOKED_AT = 64
 """Of two chains, a cell in which the volumes of a level touch is tried with the next level at once, except for volumes that faces separate.
 Cuts for volumes that touch would only multiply the cells of the next level, which has to be cut in other joints. Of the configurations of a
 cell, this many, and fewer than twice as many, are looked at: cells are cut where volumes touch in a small corner only."""
-CUTS, LEAST_ROOM, MOST_ROOM = 3, 1e-5, 10.0
-"""For coarse volumes, a cell is cut in the best of CUTS joints. Room for a plane counts as LEAST_ROOM where it is less, and as MOST_ROOM
-where it is more."""
 BEYOND = 1e-9
 """A point may lie beyond a face by this."""
 FEW = 16
@@ -80,6 +82,13 @@ class Report:
     cells: int = 0
     contacts: list[Array] = field(default_factory=list)
     narrow: list[Array] = field(default_factory=list)
+
+
+class LeastTurn(NamedTuple):
+    """A cell is cut for coarse volumes if one of their joints turns more than ``in_all``, and that of the cut more than ``in_one``."""
+
+    in_all: float
+    in_one: float
 
 
 class Search:
@@ -193,15 +202,17 @@ class Search:
             return None
         for level in range(min(cell.node.level, len(self._levels)) - 1, 0, -1):
             bodies = self._levels[level]
-            tried = self._shared.tried(bodies, cell, start)
-            if isinstance(tried.found, Separated):
-                self._separated(cell, level, tried.found)
+            found = self._shared.tried(bodies, cell, start)
+            if isinstance(found, Separated):
+                self._separated(cell, level, found)
                 return None
-            if self._worth_a_cut(cell, bodies, tried.found):
-                if tried.joint is None:
-                    tried.joint = self._cut(cell, bodies, tried.found)
-                if bodies is self.parted or self._two_chains or self._turn(cell, bodies)[tried.joint] > NARROW_CUT:
-                    return tried.joint, tried.found.points
+            least = self._least_turn(cell, bodies, found)
+            if self._turn(cell, bodies)[bodies.joints].max(initial=0.0) > least.in_all:
+                joint = self._cut(cell, bodies, found)
+                if self._turn(cell, bodies)[joint] > least.in_one:
+                    return joint, found.points
+            if bodies is self.parted:
+                return None
             cell.node.level = level
         found = self.bodies.separate(cell, start)
         if isinstance(found, Separated):
@@ -222,15 +233,20 @@ class Search:
         level = min(node.level, len(self._levels)) - 1
         return self._levels[level] if level >= self._fat else self.bodies
 
-    def _worth_a_cut(self, cell: Cell, bodies: Bodies, found: Undecided) -> bool:
-        """Returns whether a cell is cut for coarse volumes, or goes on to the next level."""
-        turn = self._turn(cell, bodies)[bodies.joints].max(initial=0.0)
+    def _least_turn(self, cell: Cell, bodies: Bodies, found: Undecided) -> LeastTurn:
+        """Returns how far a cell has to turn to be cut for coarse volumes; otherwise it goes on to the next level."""
         if bodies is self.parted:
-            return bool(turn > NARROW_PARTED)
-        if self._two_chains and _touch(bodies, found):
-            return False
-        hopeless = not len(cell.samples) and found.joint is None and (len(self.bodies.joints) <= FEW_JOINTS or turn < NARROWER)
-        return not hopeless and turn > NARROW_COARSE
+            return LeastTurn(NARROW_APART, 0.0)
+        many = len(self.bodies.joints) >= MANY_JOINTS
+        touch = many and _touch(bodies, found)
+        if self._two_chains and touch:
+            return LeastTurn(np.inf, np.inf)
+        if many and not touch and not self._two_chains:
+            return LeastTurn(NARROW_APART, 0.0)
+        in_one = 0.0 if self._two_chains else NARROW_CUT
+        if len(cell.samples) or found.joint is not None:
+            return LeastTurn(NARROW_COARSE, in_one)
+        return LeastTurn(NARROWER if many else np.inf, in_one)
 
     def _start(self, cell: Cell) -> Array | None:
         """Returns a point of the polytope in the cell; None, after the node was settled, where there is none."""
@@ -246,32 +262,13 @@ class Search:
         node.plane, node.streams = self._levels[level].in_proof(found, self.joints)
 
     def _cut(self, cell: Cell, bodies: Bodies, found: Undecided) -> int:
-        """Returns the joint to cut a cell in: where proofs took most pieces, or where points that no plane separates lie farthest apart.
-
-        For coarse volumes it is, of the CUTS joints with the farthest points, the one that makes most room for planes in both halves.
-        A bad cut there takes several times as many cells.
-        """
+        """Returns the joint to cut a cell in: where proofs took most pieces, or the one that changes the gap most (docs/trials.md)."""
         turn = self._turn(cell, bodies)
-        wide = turn * self._area.finer > NARROW / 2
+        wide = [joint for joint in bodies.joints if turn[joint] * self._area.finer > NARROW / 2] or bodies.joints
         if found.support is None:
-            return found.joint if found.joint in bodies.joints and wide[found.joint] else max(bodies.joints, key=lambda j: float(turn[j]))
-        q = self._area.scene.offset(found.support) / self._area.scene.scale(bodies.extent)
-        mean = found.weights @ q / found.weights.sum()
-        spread = found.weights @ (q - mean) ** 2
-        order = sorted(bodies.joints, key=lambda j: -float(spread[j]) if wide[j] else 1.0)
-        if bodies is self.bodies:
-            return order[0]
-        return max(order[:CUTS], key=lambda j: self._room(cell, bodies, j, found.points))
-
-    def _room(self, cell: Cell, bodies: Bodies, joint: int, points: Array) -> float:
-        """Returns how much room for planes a cut makes in both halves of a cell, on a logarithmic scale; at most that of EMPTY halves."""
-        value, room = self._middle_of(cell, joint), 0.0
-        if value is None:
-            return -np.inf
-        for half in self._halves(cell, joint, value, points):
-            start = self._start(half)
-            room += np.log(MOST_ROOM if start is None else min(max(bodies.room(half, start), LEAST_ROOM), MOST_ROOM))
-        return float(room)
+            return found.joint if found.joint in wide else max(bodies.joints, key=lambda joint: float(turn[joint]))
+        changes = bodies.changes(cell, found.weights @ found.support / found.weights.sum(), wide)
+        return max(zip(changes, turn[wide], wide, strict=True))[2]
 
     def _inside(self, cell: Cell) -> Array | None:
         """Returns a point of the polytope in the cell; None, after the node was settled, where there is none."""

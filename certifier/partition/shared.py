@@ -7,7 +7,6 @@ the result which pairs a process was asked for before.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
 
 from cachetools import LRUCache
 
@@ -20,21 +19,13 @@ MOST = 2000
 """What was found is kept for at most this many cells."""
 
 
-@dataclass(eq=False)
-class Tried:
-    """Holds what was found in a cell, and the joint to cut it in, once that was asked for."""
-
-    found: Separated | Undecided
-    joint: int | None = None
-
-
 class Shared:
     """Holds the coarse volumes of the pairs of one polytope, and what was found for them."""
 
     def __init__(self, area: Area) -> None:
         self._area = area
         self._bodies: dict[tuple[object, ...], Bodies] = {}
-        self._tried: LRUCache[bytes, Tried] = LRUCache(MOST)
+        self._tried: LRUCache[bytes, Separated | Undecided] = LRUCache(MOST)
 
     def bodies(self, frame: str, volumes: tuple[Volume, Volume]) -> Bodies:
         """Returns two volumes as bodies, the same ones for volumes of one shape and padding, whatever geometries they stand for."""
@@ -44,10 +35,10 @@ class Shared:
             self._bodies[key] = Bodies(self._area, frame, volumes)
         return self._bodies[key]
 
-    def tried(self, bodies: Bodies, cell: Cell, start: Array) -> Tried:
+    def tried(self, bodies: Bodies, cell: Cell, start: Array) -> Separated | Undecided:
         """Returns what is found for two of these bodies in a cell; ``start`` is a point of the polytope in it."""
         parts = (cell.lower, cell.upper, start, cell.points)
         key = hashlib.blake2b(id(bodies).to_bytes(8, "little") + b"".join(part.tobytes() for part in parts), digest_size=16).digest()
         if key not in self._tried:
-            self._tried[key] = Tried(bodies.separate(cell, start))
+            self._tried[key] = bodies.separate(cell, start)
         return self._tried[key]
