@@ -21,7 +21,6 @@ import heapq
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
@@ -60,9 +59,9 @@ ROOM = 0.25
 """At every point that stays inside, the volumes that faces separate are farther apart than this part of the larger radius. Faces between
 nearer ones would have to pass close by the point, and cost most of the polytope."""
 LOOKED_AT = 64
-"""Of two chains, a cell in which the volumes of a level touch is tried with the next level at once, except for volumes that faces separate.
-Cuts for volumes that touch would only multiply the cells of the next level, which has to be cut in other joints. Of the configurations of a
-cell, this many, and fewer than twice as many, are looked at: cells are cut where volumes touch in a small corner only."""
+"""Whether volumes touch is looked at at this many configurations of a cell, and fewer than twice as many: cells are cut where volumes touch
+in a small corner only. Of two chains, a cell in which the volumes of a level touch is tried with the next level at once, except for volumes
+that faces separate. Cuts for them would only multiply the cells of the next level, which has to be cut in other joints."""
 BEYOND = 1e-9
 """A point may lie beyond a face by this."""
 FEW = 16
@@ -82,13 +81,6 @@ class Report:
     cells: int = 0
     contacts: list[Array] = field(default_factory=list)
     narrow: list[Array] = field(default_factory=list)
-
-
-class LeastTurn(NamedTuple):
-    """A cell is cut for coarse volumes if one of their joints turns more than ``in_all``, and that of the cut more than ``in_one``."""
-
-    in_all: float
-    in_one: float
 
 
 class Search:
@@ -206,11 +198,9 @@ class Search:
             if isinstance(found, Separated):
                 self._separated(cell, level, found)
                 return None
-            least = self._least_turn(cell, bodies, found)
-            if self._turn(cell, bodies)[bodies.joints].max(initial=0.0) > least.in_all:
-                joint = self._cut(cell, bodies, found)
-                if self._turn(cell, bodies)[joint] > least.in_one:
-                    return joint, found.points
+            joint = self._cut_for(cell, bodies, found)
+            if joint is not None:
+                return joint, found.points
             if bodies is self.parted:
                 return None
             cell.node.level = level
@@ -233,20 +223,25 @@ class Search:
         level = min(node.level, len(self._levels)) - 1
         return self._levels[level] if level >= self._fat else self.bodies
 
-    def _least_turn(self, cell: Cell, bodies: Bodies, found: Undecided) -> LeastTurn:
-        """Returns how far a cell has to turn to be cut for coarse volumes; otherwise it goes on to the next level."""
-        if bodies is self.parted:
-            return LeastTurn(NARROW_APART, 0.0)
+    def _cut_for(self, cell: Cell, bodies: Bodies, found: Undecided) -> int | None:
+        """Returns the joint to cut a cell in for coarse volumes; None where it is too narrow for them."""
+        in_all, in_one = self._narrow(cell, bodies, found)
+        turn = self._turn(cell, bodies)
+        if turn[bodies.joints].max(initial=0.0) <= in_all:
+            return None
+        joint = self._cut(cell, bodies, found)
+        return joint if turn[joint] > in_one else None
+
+    def _narrow(self, cell: Cell, bodies: Bodies, found: Undecided) -> tuple[float, float]:
+        """Returns how far a cell may turn, in all joints of coarse volumes and in the joint of the cut, and is not cut for them."""
         many = len(self.bodies.joints) >= MANY_JOINTS
         touch = many and _touch(bodies, found)
+        if bodies is self.parted or (many and not touch and not self._two_chains):
+            return NARROW_APART, 0.0
         if self._two_chains and touch:
-            return LeastTurn(np.inf, np.inf)
-        if many and not touch and not self._two_chains:
-            return LeastTurn(NARROW_APART, 0.0)
-        in_one = 0.0 if self._two_chains else NARROW_CUT
-        if len(cell.samples) or found.joint is not None:
-            return LeastTurn(NARROW_COARSE, in_one)
-        return LeastTurn(NARROWER if many else np.inf, in_one)
+            return np.inf, np.inf
+        in_all = NARROW_COARSE if len(cell.samples) or found.joint is not None else NARROWER if many else np.inf
+        return in_all, 0.0 if self._two_chains else NARROW_CUT
 
     def _start(self, cell: Cell) -> Array | None:
         """Returns a point of the polytope in the cell; None, after the node was settled, where there is none."""
