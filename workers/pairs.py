@@ -100,7 +100,7 @@ def _certification(scene_id: str, job_id: str, iteration: int) -> CertifyPart:
     action, options = persistently(read)
     scene = load_scene(scene_id)
     # Proofs are taken over in the round in which partitions begin, and the rounds after it go on with what it left.
-    former = former_of(scene, options) if action.begun is None else None
+    former = None if action.begun else former_of(scene, options)
     return part_certifier(scene, action, options.random_seed, partial(_left, job_id), None if former is None else former.carried)
 
 

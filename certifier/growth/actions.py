@@ -47,7 +47,7 @@ class Certify:
             certify all pairs.
         cells: number of cells to look at for each pair; 1 for the program (11) of the papers on all of the polytope.
         box: the root cell of all partitions, proved around the polytope of the first of them; None for the polytope's smallest box.
-        begun: the iteration in which the partitions of all pairs were begun; None where they begin in this one.
+        begun: pair index -> the iteration in which its partition was begun; pairs that are left out begin in this one.
         parts: pair index -> how many parts its open cells are divided among; 1 for a pair that is left out.
         ending: pairs whose open cells are going to be cut off where the volumes touch that are tried next in these cells; all open cells
             where the pair is hard as well.
@@ -66,7 +66,7 @@ class Certify:
     failures: int | None
     cells: int = 1
     box: ProvedBox | None = None
-    begun: int | None = None
+    begun: dict[int, int] = field(default_factory=dict)
     parts: dict[int, int] = field(default_factory=dict)
     ending: list[int] = field(default_factory=list)
     keep: Array | None = None

@@ -59,7 +59,7 @@ class Whole:
         polytope: what the cuts so far keep; faces are added before the joint limits, which are its last 2n rows, and none is dropped.
         mid, half, Y_lower, Y_upper: of the :class:`ProvedBox` that is the root cell of all partitions of this stage.
         holds: pair index -> iteration whose proof, on a larger polytope, holds on the present one.
-        begun: the iteration with which this stage began; None before it.
+        begun: pair index -> the iteration of this stage in which its partition was begun; pairs without one are left out.
         open_cells: pair index -> how many cells of its partition are open.
         spent: pair index -> how many cells were looked at.
         cuts: pair index -> in how many rounds something was cut off for it; pairs without a cut are left out.
@@ -76,7 +76,7 @@ class Whole:
     Y_lower: Array
     Y_upper: Array
     holds: dict[int, int] = field(default_factory=dict)
-    begun: int | None = None
+    begun: dict[int, int] = field(default_factory=dict)
     open_cells: dict[int, int] = field(default_factory=dict)
     spent: dict[int, int] = field(default_factory=dict)
     cuts: dict[int, int] = field(default_factory=dict)

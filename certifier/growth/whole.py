@@ -23,7 +23,7 @@ from certifier.growth.state import GrowthState, Start, Whole
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.pair.result import Weakness
-from certifier.partition.together import THIN, Together, together
+from certifier.partition.together import THIN, Together, divided, together
 from certifier.polytopes.cutting import BARELY, Cut, cut, lost_together, samples_of
 from certifier.polytopes.proved import ProvedBox
 from certifier.polytopes.pushed import pushed
@@ -127,7 +127,7 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     whole, action = state.whole, report.action
     assert whole is not None
     holds = whole.holds | {i: action.iteration for i, outcome in report.outcomes.items() if outcome is Outcome.CERTIFIED}
-    begun = action.iteration if action.begun is None else action.begun
+    begun = dict.fromkeys(action.pairs, action.iteration) | action.begun
     spent = whole.spent | {i: whole.spent.get(i, 0) + SLICE * max(action.parts.get(i, 1), PARTS) for i in action.pairs}
     whole = replace(whole, holds=holds, begun=begun, open_cells=dict(report.open_cells), spent=spent, passed=report.passed)
     if report.complete:
@@ -136,7 +136,8 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     if unknown is not None:  # Nothing can be cut off for it, so it would fail again and again.
         pair = scene.pairs[unknown]
         return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing is known of where they fail")
-    failing = [i for i in report.failures if report.open_cells.get(i) != 0]
+    whole, regrouped = _regrouped(scene, start, whole, report)
+    failing = [i for i in report.failures if report.open_cells.get(i) != 0 and i not in regrouped]
     if not failing:
         return _next(scene, replace(state, whole=whole))
     most = {i: _most_loss(state, whole, i, 0 if report.weaknesses[i].joints else HARD) for i in failing}
@@ -161,6 +162,27 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     gone = {i for i in failing if not smaller.contains(report.weaknesses[i].points).all()} if smaller is not whole.polytope else set()
     cuts = whole.cuts | {i: whole.cuts.get(i, 0) + 1 for i in gone}
     return _next(scene, replace(state, whole=replace(whole, polytope=smaller, cuts=cuts)))
+
+
+def _regrouped(scene: Scene, start: Start, whole: Whole, report: Outcomes) -> tuple[Whole, list[int]]:
+    """Divides the groups of pairs whose volumes touch where none of their geometries do. Faces before all these places would be many.
+
+    Returns:
+        The progress, in which the pairs of these groups begin anew, in smaller groups or alone; and the pairs that stood for the groups.
+    """
+    together, gone = dict(whole.together), []
+    for i in report.failures:
+        contacts = report.weaknesses[i].points[: report.weaknesses[i].contacts]
+        if i in together and len(contacts):
+            smaller = divided(scene, [i, *together[i]], contacts, start.keep)
+            if smaller is not None:
+                del together[i]
+                together |= smaller
+                gone.append(i)
+    begun, open_cells, spent = (
+        {i: count for i, count in known.items() if i not in gone} for known in (whole.begun, whole.open_cells, whole.spent)
+    )
+    return replace(whole, together=together, begun=begun, open_cells=open_cells, spent=spent), gone
 
 
 def _corners(scene: Scene, pair: int, weakness: Weakness, most: float) -> list[tuple[tuple[int, ...], Array, float]]:

@@ -27,7 +27,7 @@ def part_certifier(scene: Scene, action: Certify, seed: int, left: Left, carried
 
     Args:
         seed: seeds the samples.
-        left: reads what the iterations from ``action.begun`` on have left.
+        left: reads what the iterations in ``action.begun``, and those after them, have left.
         carried: what the proof of a region of the scene before it changed is worth; None where there is no such region.
 
     Raises:
@@ -38,24 +38,26 @@ def part_certifier(scene: Scene, action: Certify, seed: int, left: Left, carried
     if action.cells == 1:
         program = Certification(scene, action.polytope, action.center, seed)
         return lambda index, part: program.certify(index, every_face=index in action.hard)
-    search, begun = CellCertification(scene, action.polytope, seed, action.box, action.together, action.keep), action.begun
-    if begun is None:
-        return _beginning(search, action, cut_off, carried or Carry({}, {}))
+    search = CellCertification(scene, action.polytope, seed, action.box, action.together, action.keep)
+    begin = _beginning(search, action, cut_off, carried or Carry({}, {}))
 
-    def go_on(index: int, part: int) -> PairResult:
+    def certify(index: int, part: int) -> PairResult:
+        begun = action.begun.get(index)
+        if begun is None:
+            return begin(index)
         last, parts = left(action.iteration - 1, index), action.parts.get(index, 1)
         if not open_cells(last):
             return search.put_together(index, [left(iteration, index) for iteration in range(begun, action.iteration)], part, parts)
         return search.go_on(index, action.cells, last, part, parts, cut_off.get(index, CutOff.CONTACTS))
 
-    return go_on
+    return certify
 
 
-def _beginning(search: CellCertification, action: Certify, cut_off: dict[int, CutOff], carried: Carry) -> CertifyPart:
+def _beginning(search: CellCertification, action: Certify, cut_off: dict[int, CutOff], carried: Carry) -> Callable[[int], PairResult]:
     """Returns the function that begins the partition of a pair, or takes over the proof that it has already."""
     files: dict[int, bytes] = {}
 
-    def begin(index: int, part: int) -> PairResult:
+    def begin(index: int) -> PairResult:
         if index not in carried.proofs:
             return search.certify(index, action.cells, cut_off.get(index, CutOff.CONTACTS), carried.starts.get(index))
         proof = carried.proofs[index]

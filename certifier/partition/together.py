@@ -49,15 +49,33 @@ def together(scene: Scene, samples: Array, keep: Array) -> Together:
     return found
 
 
+def divided(scene: Scene, members: Sequence[int], contacts: Array, keep: Array) -> Together | None:
+    """Returns smaller groups of the pairs of a group whose volumes touch; None where its geometries touch there as well.
+
+    Args:
+        contacts: (S, n) configurations at which the volumes of the group touch.
+        keep: as for :func:`together`.
+    """
+    first, second = _sides(scene, [scene.pairs[index] for index in members])
+    numbers = {frozenset((scene.pairs[index].a, scene.pairs[index].b)): index for index in members}
+    found = _joined(scene, first, second, numbers, contacts, keep)
+    return None if found == [sorted(members)] else {index: tuple(others) for index, *others in found}
+
+
 def volumes_of(scene: Scene, pairs: Sequence[Pair]) -> tuple[Volume, Volume]:
     """Returns the two volumes around the geometries of pairs between the same two rigid parts; one pair has the geometries themselves."""
-    kinematics, geometries = (
-        Kinematics.of(scene),
-        [scene.geometry(name) for name in sorted({n for pair in pairs for n in (pair.a, pair.b)})],
-    )
+    kinematics = Kinematics.of(scene)
+    first, second = _sides(scene, pairs)
+    return _volume(kinematics, first), _volume(kinematics, second)
+
+
+def _sides(scene: Scene, pairs: Sequence[Pair]) -> tuple[list[Geometry], list[Geometry]]:
+    """Returns the geometries of pairs between the same two rigid parts, those of either part."""
+    kinematics = Kinematics.of(scene)
+    geometries = [scene.geometry(name) for name in sorted({n for pair in pairs for n in (pair.a, pair.b)})]
     root = kinematics.rigid_root(scene.geometry(pairs[0].a).body)
     first, second = ([g for g in geometries if (kinematics.rigid_root(g.body) == root) == here] for here in (True, False))
-    return _volume(kinematics, first), _volume(kinematics, second)
+    return first, second
 
 
 def _volume(kinematics: Kinematics, geometries: Sequence[Geometry]) -> Volume:

@@ -208,7 +208,7 @@ BOX = ProvedBox(np.zeros(1), np.ones(1), np.array([[0.0, 0.0, 0.0, 1.0]]), np.ar
 def begin(database: Database, job: JobRow, index: int, parts: dict[int, int], reuse: dict[int, int] | None = None) -> pairs.Claim:
     """Claims all of a further iteration, in which pairs have so many parts."""
     new = [pairs.NewPair(i, f"a{i}", f"b{i}", 0.01, part) for i, count in parts.items() for part in range(count)]
-    more: dict[str, Any] = {"box": BOX, "begun": 0 if index else None, "cells": 100, "parts": parts}
+    more: dict[str, Any] = {"box": BOX, "begun": dict.fromkeys(parts, 0) if index else {}, "cells": 100, "parts": parts}
     with database.write() as session:
         row = jobs.lock(session, job.id)
         polytope = {"C": [[1.0], [-1.0]], "d": [1.0, 1.0], "center": None}
@@ -252,6 +252,11 @@ def test_a_running_job_shows_what_its_rounds_have_left(database: Database, job: 
     assert third["cuts"] == [0.0, -0.5, 0.5]
     assert third["counts"] == {"plane": 2, "empty": 1, "open": 1}
     assert client.get(f"/v1/{path}?iteration=7").json()["detail"] == "pair 0 has no cells: the job has not begun iteration 7 with it"
+
+
+@pytest.mark.parametrize(("stored", "begun"), [({"3": 5}, 5), ({"4": 5}, 7), ({}, 7), (None, 7), (2, 2)])
+def test_it_is_known_when_a_pair_was_begun_also_from_earlier_versions(stored: Any, begun: int) -> None:
+    assert cells._begun(stored, 3, 7) == begun
 
 
 def test_an_ended_job_keeps_the_cells_of_what_it_has_not_certified(database: Database, job: JobRow, ask: Ask) -> None:

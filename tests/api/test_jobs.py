@@ -225,7 +225,7 @@ def test_the_parts_of_a_pair_are_shown_as_one(client: TestClient, database: Data
         job = jobs.lock(session, job_id)
         jobs.start(session, job)
         new = [pairs.NewPair(index, f"a{index}", f"b{index}", 1.0, part) for index, part in ((0, 0), (0, 1), (1, 0))]
-        more = {"cells": 50, "begun": 0, "parts": {0: 2}}
+        more = {"cells": 50, "begun": {0: 0, 1: 0}, "parts": {0: 2}}
         C, d = polytope.C, polytope.d
         add_iteration(session, job, index=0, label="given", C=C, d=d, center=None, pairs=new, reuse={}, hard=[], failures=None, **more)
         claim = pairs.claim(session, job, lease_seconds=60, batch_seconds=60)

@@ -49,7 +49,7 @@ def next_round(db: Database, job_id: str, index: int, parts: tuple[int, ...] = (
         job = jobs.lock(session, job_id)
         new = [pairs.NewPair(i, f"a{i}", f"b{i}", 0.01, part) for i, count in enumerate(parts) for part in range(count)]
         box, polytope = BOX, {"C": [[1.0], [-1.0]], "d": [1.0, 1.0], "center": None}
-        more = {"box": box, "begun": 0, "parts": dict(enumerate(parts))}
+        more = {"box": box, "begun": dict.fromkeys(range(len(parts)), 0), "parts": dict(enumerate(parts))}
         add_iteration(session, job, index=index, label="cells", **polytope, pairs=new, reuse={}, hard=[], failures=None, **more)
     return claim(db, job_id)
 

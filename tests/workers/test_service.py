@@ -88,7 +88,7 @@ def test_a_whole_region_is_the_same_when_workers_die_between_its_rounds(planar: 
     def goes_on() -> PairRow | None:
         with database().read() as session:
             rows = session.scalars(select(IterationRow).where(IterationRow.job_id == job_id))
-            begun = {row.index for row in rows if row.action["begun"] is not None}
+            begun = {row.index for row in rows if row.action["begun"]}
         return next((row for row in pairs_of(job_id) if row.state == "running" and row.iteration in begun), None)
 
     killed = eventually(goes_on, "a pair is gone on with")

@@ -86,7 +86,7 @@ def drive(verdict, asked, limit=40, passed=lambda action: 0.0):
 
 def stages(made):
     """Splits certifications where a new stage begins."""
-    begins = [i for i, action in enumerate(made) if action.begun is None]
+    begins = [i for i, action in enumerate(made) if not action.begun]
     return [made[i:j] for i, j in zip(begins, [*begins[1:], len(made)], strict=True)]
 
 
@@ -116,7 +116,7 @@ def test_where_bodies_touch_is_cut_off_and_what_holds_is_not_asked_for_again():
     assert len(small) == len(others) == 1, "one more stage sees that there is little to gain"
     assert [action.pairs for action in (first, last)] == [[0, 1], [1]]
     assert last.reuse == {0: 1}
-    assert last.begun == 1
+    assert last.begun == {0: 1, 1: 1}
     assert last.box.mid.tolist() == first.box.mid.tolist()
     assert last.box.half.tolist() == first.box.half.tolist()
     assert not last.polytope.contains(CORNER).any()
@@ -238,10 +238,10 @@ def test_open_cells_are_dealt_to_parts_and_a_pair_without_any_is_put_together_in
     rounds = {0: 2, 1: 4}
 
     def reached(action, index, part):
-        last = action.begun is not None and action.iteration - action.begun >= rounds[index]
-        if last:
+        gone_on = action.iteration - action.begun.get(index, action.iteration)
+        if gone_on >= rounds[index]:
             return index, Outcome.CERTIFIED, None, None
-        left = 0 if action.begun is not None and action.iteration - action.begun == rounds[index] - 1 else 50
+        left = 0 if gone_on == rounds[index] - 1 else 50
         return index, Outcome.INCONCLUSIVE, weak([]), left
 
     made, transition = [], begin(SCENE, options(cells=50 * SLICE))
@@ -251,7 +251,7 @@ def test_open_cells_are_dealt_to_parts_and_a_pair_without_any_is_put_together_in
             made.append(transition.action)
             report = Outcomes.of_parts(transition.action, [reached(transition.action, *work) for work in transition.action.work])
         transition = advance(SCENE, transition.state, report)
-    assert [action.begun for action in made] == [None, 0, 0, 0, 0]
+    assert [action.begun for action in made] == [{}, *[{0: 0, 1: 0}] * 4]
     shared = PIECES // 2
     # The first round counts as PARTS slices.
     together = (PARTS + shared) * SLICE // VERIFIED
@@ -261,7 +261,7 @@ def test_open_cells_are_dealt_to_parts_and_a_pair_without_any_is_put_together_in
     assert made[-1].reuse == {0: 2}
     assert made[-1].work == [(1, part) for part in range(made[-1].parts[1])]
     assert isinstance(transition.action, Certify)
-    assert (transition.state.best.iteration, transition.action.begun) == (4, None)
+    assert (transition.state.best.iteration, transition.action.begun) == (4, {})
 
 
 def test_a_contact_at_a_configuration_to_keep_ends_without_a_region():
@@ -441,7 +441,7 @@ def test_a_child_that_dies_leaves_the_region_before(monkeypatch):
     certifier = local.part_certifier
 
     def dying(scene, action, *others):
-        in_the_second_stage = action.iteration > 1 and action.begun is None
+        in_the_second_stage = action.iteration > 1 and not action.begun
         return (lambda index, part: os._exit(1)) if in_the_second_stage else certifier(scene, action, *others)
 
     monkeypatch.setattr(local, "part_certifier", dying)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from certifier.errors import ProofError
+from certifier.growth import whole
 from certifier.growth.options import GrowthOptions
 from certifier.jobs.local import grow, recertify
 from certifier.kinematics import Kinematics
@@ -16,7 +17,7 @@ from certifier.model import WORLD, Pair, Polytope
 from certifier.outcome import Outcome
 from certifier.partition.certification import CellCertification
 from certifier.partition.hulls import gaps, hull
-from certifier.partition.together import LOST, together, volumes_of
+from certifier.partition.together import LOST, divided, together, volumes_of
 from certifier.proof import limits
 from certifier.proof.region import read_part
 from certifier.verify.kinematics import ExactKinematics
@@ -81,6 +82,33 @@ def test_hulls_that_touch_what_none_of_their_balls_does_are_divided():
     scene = beads(4, 0.6, 0.05, box("world/obstacle", WORLD, (0.1, 0.1, 0.1), (1.2, 0.0, 0.0)))
     narrow = samples(scene, 0.01)
     assert sorted(units(scene, together(scene, narrow, KEEP)))[:2] == [(0, 1), (2, 3)]
+
+
+def test_a_group_is_divided_where_its_hull_touches_what_none_of_its_balls_does():
+    scene = beads(4, 0.6, 0.05, box("world/obstacle", WORLD, (0.1, 0.1, 0.1), (1.2, 0.0, 0.0)))
+    away = np.array([[1.2, 0.0]])
+    assert divided(scene, (0, 1, 2, 3), KEEP, away) == {0: (1,), 2: (3,)}
+    assert divided(scene, (1, 2), KEEP, away) == {}, "two pairs are alone then"
+
+
+def test_a_group_stays_together_where_one_of_its_balls_touches_as_well():
+    scene = beads(obstacle=box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.875, 0.0, 0.0)))
+    assert divided(scene, (0, 1, 2, 3), KEEP, np.array([[1.5, 0.0]])) is None
+
+
+def test_growth_divides_a_group_that_touches_and_no_face_is_needed(monkeypatch):
+    """The obstacle can be between two balls: it touches their hull, and none of them anywhere in the box that is proposed."""
+    scene = beads(4, 0.6, 0.05, box("world/obstacle", WORLD, (0.1, 0.1, 0.1), (1.2, 0.35, 0.0)))
+    scene = replace(scene, pairs=scene.pairs[:4])
+    monkeypatch.setattr(whole, "together", lambda *_: {0: (1, 2, 3)})
+    asked = GrowthOptions(seed=box_seed([0.0, 0.0], 0.25), cells=600)
+    region = grow(scene, asked)
+    assert proved(scene, region) > 1
+    assert region.manifest["share"]["value"] == 1
+    monkeypatch.setattr(whole, "divided", lambda *_: None)
+    other = grow(scene, asked)
+    assert proved(scene, other) == 1
+    assert other.manifest["share"]["value"] < 0.9
 
 
 def test_a_configuration_to_keep_divides_a_hull_that_no_sample_does():
