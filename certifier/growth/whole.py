@@ -136,8 +136,8 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     if unknown is not None:  # Nothing can be cut off for it, so it would fail again and again.
         pair = scene.pairs[unknown]
         return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing is known of where they fail")
-    whole, regrouped = _regrouped(scene, start, whole, report)
-    failing = [i for i in report.failures if report.open_cells.get(i) != 0 and i not in regrouped]
+    whole = _regrouped(scene, start, whole, report)
+    failing = [i for i in report.failures if report.open_cells.get(i) != 0 and i in whole.begun]
     if not failing:
         return _next(scene, replace(state, whole=whole))
     most = {i: _most_loss(state, whole, i, 0 if report.weaknesses[i].joints else HARD) for i in failing}
@@ -164,25 +164,23 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     return _next(scene, replace(state, whole=replace(whole, polytope=smaller, cuts=cuts)))
 
 
-def _regrouped(scene: Scene, start: Start, whole: Whole, report: Outcomes) -> tuple[Whole, list[int]]:
-    """Divides the groups of pairs whose volumes touch where none of their geometries do. Faces before all these places would be many.
+def _regrouped(scene: Scene, start: Start, whole: Whole, report: Outcomes) -> Whole:
+    """Divides the groups of pairs whose volumes touch where none of their geometries do: many faces would be needed there.
 
-    Returns:
-        The progress, in which the pairs of these groups begin anew, in smaller groups or alone; and the pairs that stood for the groups.
+    The pairs of such a group begin anew in the next round, in smaller groups or alone.
     """
-    together, gone = dict(whole.together), []
+    grouped, anew = dict(whole.together), set()
     for i in report.failures:
         contacts = report.weaknesses[i].points[: report.weaknesses[i].contacts]
-        if i in together and len(contacts):
-            smaller = divided(scene, [i, *together[i]], contacts, start.keep)
-            if smaller is not None:
-                del together[i]
-                together |= smaller
-                gone.append(i)
+        smaller = divided(scene, [i, *grouped[i]], contacts, start.keep) if i in grouped and len(contacts) else None
+        if smaller is not None:
+            del grouped[i]
+            grouped |= smaller
+            anew.add(i)
     begun, open_cells, spent = (
-        {i: count for i, count in known.items() if i not in gone} for known in (whole.begun, whole.open_cells, whole.spent)
+        {i: number for i, number in known.items() if i not in anew} for known in (whole.begun, whole.open_cells, whole.spent)
     )
-    return replace(whole, together=together, begun=begun, open_cells=open_cells, spent=spent), gone
+    return replace(whole, together=grouped, begun=begun, open_cells=open_cells, spent=spent)
 
 
 def _corners(scene: Scene, pair: int, weakness: Weakness, most: float) -> list[tuple[tuple[int, ...], Array, float]]:

@@ -235,7 +235,7 @@ class Search:
     def _narrow(self, cell: Cell, bodies: Bodies, found: Undecided) -> tuple[float, float]:
         """Returns how far a cell may turn, in all joints of coarse volumes and in the joint of the cut, and is not cut for them."""
         many = len(self.bodies.joints) >= MANY_JOINTS
-        touch = many and _touch(bodies, found)
+        touch = many and bodies is not self.parted and _touch(bodies, found)
         if bodies is self.parted or (many and not touch and not self._two_chains):
             return NARROW_APART, 0.0
         if self._two_chains and touch:

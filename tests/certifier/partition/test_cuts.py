@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from certifier.model import WORLD, Volume
+from certifier.model import WORLD
 from certifier.partition import search
 from certifier.partition.area import Area
 from certifier.partition.bodies import Bodies, Undecided
@@ -15,6 +15,7 @@ from certifier.partition.cell import Cell
 from certifier.partition.certification import CellCertification
 from certifier.partition.hulls import gaps
 from certifier.partition.search import NARROW_APART, NARROW_COARSE, NARROW_CUT, Search
+from certifier.partition.together import volumes_of
 from certifier.partition.tree import Node, OpenCell
 from certifier.proof.outline import OPEN
 from tests.certifier.scenes import box, cube, planar_arm
@@ -28,14 +29,10 @@ def apart(links, place):
     return scene, Area.of(scene, cube(scene, 0.0, 0.2), 0)
 
 
-def volumes_of(scene):
-    return tuple(Volume.of(scene.geometry(name)) for name in (scene.pairs[0].a, scene.pairs[0].b))
-
-
 @pytest.mark.parametrize("place", [(3.6, 0.0, 0.0), (3.4, 1.6, 0.0), (1.0, -2.5, 0.5)])
 def test_the_gap_changes_as_distances_do_that_are_computed_in_another_way(place):
     scene, area = apart(3, place)
-    bodies, cell = Bodies(area, WORLD, volumes_of(scene)), Cell.at(area, Node(), area.lower, area.upper, area.samples)
+    bodies, cell = Bodies(area, WORLD, volumes_of(scene, scene.pairs)), Cell.at(area, Node(), area.lower, area.upper, area.samples)
     for s in area.samples[:5]:
         changes = bodies.changes(cell, s, bodies.joints)
         for joint, change in zip(bodies.joints, changes, strict=True):
@@ -48,7 +45,7 @@ def test_the_gap_changes_as_distances_do_that_are_computed_in_another_way(place)
 def test_a_joint_whose_ends_are_alike_is_cut_if_the_gap_changes_between_them():
     """The arm points at the block: joint 1 turns it away to either side, by as much."""
     scene, area = apart(2, (2.4, 0.0, 0.0))
-    bodies, cell = Bodies(area, WORLD, volumes_of(scene)), Cell.at(area, Node(), area.lower, area.upper, area.samples)
+    bodies, cell = Bodies(area, WORLD, volumes_of(scene, scene.pairs)), Cell.at(area, Node(), area.lower, area.upper, area.samples)
     changes = bodies.changes(cell, np.zeros(2), bodies.joints)
     assert changes[0] > changes[1] > 0
     ends = np.array([[area.lower[0], 0.0], [area.upper[0], 0.0]])
