@@ -116,7 +116,7 @@ def of_job_pair(database: Database, kept: OutlinesKept, scene: Scene, job_id: st
         row, parts = found
         own = parts[0].pair_index
         state = pairs.state_of_parts([PairState(part.state) for part in parts])
-        begun = _begun(row.action["begun"], own, row.index)
+        begun = row.action["begun"].get(str(own), row.index)
         left = subtrees.outlines(session, job_id, own, begun, row.index)
         counts = pairs.parts_of(session, job_id, own, left)
     if state is PairState.CERTIFIED:
@@ -128,13 +128,6 @@ def of_job_pair(database: Database, kept: OutlinesKept, scene: Scene, job_id: st
     if cells is None:
         raise _without_cells(index, f"no search has left cells of it in iteration {row.index}, where it is {state}")
     return partition(scene, index, cells, state, ProofKind.PARTITION, row.index)
-
-
-def _begun(stored: Mapping[str, int] | int | None, index: int, iteration: int) -> int:
-    """Returns the iteration in which a pair's partition was begun; an earlier version has stored one for all pairs, or None."""
-    if isinstance(stored, Mapping):
-        return stored.get(str(index), iteration)
-    return iteration if stored is None else stored
 
 
 def _without_cells(index: int, why: str) -> CirisError:

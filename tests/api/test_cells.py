@@ -254,11 +254,6 @@ def test_a_running_job_shows_what_its_rounds_have_left(database: Database, job: 
     assert client.get(f"/v1/{path}?iteration=7").json()["detail"] == "pair 0 has no cells: the job has not begun iteration 7 with it"
 
 
-@pytest.mark.parametrize(("stored", "begun"), [({"3": 5}, 5), ({"4": 5}, 7), ({}, 7), (None, 7), (2, 2)])
-def test_it_is_known_when_a_pair_was_begun_also_from_earlier_versions(stored: Any, begun: int) -> None:
-    assert cells._begun(stored, 3, 7) == begun
-
-
 def test_an_ended_job_keeps_the_cells_of_what_it_has_not_certified(database: Database, job: JobRow, ask: Ask) -> None:
     save(database, begin(database, job, 0, {0: 1, 1: 1}), {(i, 0): left(outline(0, PLANE, OPEN, cuts=(0.1,)), 1) for i in range(2)})
     before = ask(f"jobs/{job.id}/pairs/0/cells")

@@ -6,10 +6,10 @@ import pytest
 from sqlalchemy import inspect, select, text
 
 from certifier.errors import CirisError
-from db import jobs, migrate, regions, scenes
+from db import jobs, migrate, pairs, regions, scenes
 from db.models import IterationRow
 from db.session import Database
-from tests.db.builders import a_job, a_running_job, add_region, all_pairs
+from tests.db.builders import a_job, a_running_job, add_iteration, add_region, all_pairs
 from tests.scenes import slider
 
 
@@ -76,6 +76,28 @@ def test_jobs_and_their_pairs_survive_the_way_down_and_up(empty_database_url: st
         (row,) = session.scalars(select(IterationRow))
         assert (row.action["hard"], row.action["polytope"]["d"], row.failures, row.faces) == ([], [1.0, 1.0], 1, 2)
     database.close()
+
+
+def test_iterations_of_before_say_of_each_pair_when_it_was_begun(empty_database_url: str) -> None:
+    migrate.upgrade(empty_database_url)
+    database, of_before = Database(empty_database_url), {0: None, 1: 0, 2: 0}
+    with database.write() as session:
+        job = a_running_job(session, pair_count=3)
+        for index in (1, 2):
+            rows, begun = [pairs.NewPair(i, f"a{i}", f"b{i}", 1.0) for i in (0, 2)], {0: 0, 2: 0 if index == 1 else 1}
+            add_iteration(session, job, index=index, label="cells", C=[[1.0], [-1.0]], d=[1.0, 1.0], pairs=rows, begun=begun)
+    database.close()
+    migrate.downgrade(empty_database_url, "0029")
+    database = Database(empty_database_url)
+    with database.read() as session:
+        assert {row.index: row.action["begun"] for row in session.scalars(select(IterationRow))} == of_before
+    database.close()
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    with database.read() as session:
+        found = {row.index: row.action["begun"] for row in session.scalars(select(IterationRow))}
+    database.close()
+    assert found == {0: {}, 1: {"0": 0, "2": 0}, 2: {"0": 0, "2": 0}}
 
 
 def test_what_lists_show_of_a_region_survives_the_way_down_and_up(empty_database_url: str) -> None:
