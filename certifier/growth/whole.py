@@ -22,8 +22,7 @@ from certifier.growth.pairs import by_joints, joints_between
 from certifier.growth.state import GrowthState, Start, Whole
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Outcome, combine
-from certifier.pair.result import Weakness
-from certifier.partition.together import THIN, Together, divided, together
+from certifier.partition.together import LOST, THIN, Together, divided, together
 from certifier.polytopes.cutting import BARELY, Cut, cut, lost_together, samples_of
 from certifier.polytopes.proved import ProvedBox
 from certifier.polytopes.pushed import pushed
@@ -136,20 +135,21 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     if unknown is not None:  # Nothing can be cut off for it, so it would fail again and again.
         pair = scene.pairs[unknown]
         return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing is known of where they fail")
-    whole = _regrouped(scene, start, whole, report)
-    failing = [i for i in report.failures if report.open_cells.get(i) != 0 and i in whole.begun]
+    failing = [i for i in report.failures if report.open_cells.get(i) != 0]
+    made = _made(scene, state, start, whole, report, failing)
+    costly = [i for i, contacts in zip(failing, made.made[::2], strict=True) if contacts.lost > LOST]
+    anew = _regrouped(scene, start, whole, report, costly)
+    if anew is not whole:
+        whole, failing = anew, [i for i in failing if i in anew.begun]
+        made = _made(scene, state, start, whole, report, failing)
     if not failing:
         return _next(scene, replace(state, whole=whole))
-    most = {i: _most_loss(state, whole, i, 0 if report.weaknesses[i].joints else HARD) for i in failing}
-    corners = [corner for i in failing for corner in _corners(scene, i, report.weaknesses[i], most[i])]
-    around = start.rows if whole.reach >= 1 else _copy(scene, start, whole.reach)
-    made = cut(scene, whole.polytope, start.keep, corners, around)
     final = {*action.ending} & {*action.hard}
     # Cells without a point to cut off miss the polytope, and are settled in the next rounds.
-    named = any(len(points) for _, points, _ in corners)
-    stuck = named and made.polytope is whole.polytope and all(i in final and most[i] >= 1 for i in failing)
+    named = any(len(report.weaknesses[i].points) for i in failing)
+    stuck = named and made.polytope is whole.polytope and all(i in final and _most_loss(state, whole, i, report) >= 1 for i in failing)
     if stuck:  # A contact on a face would be found again and again.
-        made = cut(scene, whole.polytope, start.keep, corners, around, BARELY)
+        made = _made(scene, state, start, whole, report, failing, BARELY)
     smaller = made.polytope
     state = replace(state, obstacles=joined(state.obstacles, _obstacles(whole.stage, failing, made)))
     if stuck and smaller is whole.polytope:
@@ -164,29 +164,41 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     return _next(scene, replace(state, whole=replace(whole, polytope=smaller, cuts=cuts)))
 
 
-def _regrouped(scene: Scene, start: Start, whole: Whole, report: Outcomes) -> Whole:
-    """Divides the groups of pairs whose volumes touch where none of their geometries do: many faces would be needed there.
+def _regrouped(scene: Scene, start: Start, whole: Whole, report: Outcomes, costly: Sequence[int]) -> Whole:
+    """Divides those of the costly groups of pairs whose volumes touch where none of their geometries do.
 
-    The pairs of such a group begin anew in the next round, in smaller groups or alone.
+    The pairs of such a group begin anew in the next round, in smaller groups or alone. This takes longer than a few faces.
+
+    Args:
+        costly: pairs whose faces lose more than a group may.
     """
     grouped, anew = dict(whole.together), set()
-    for i in report.failures:
+    for i in (i for i in costly if i in grouped):
         contacts = report.weaknesses[i].points[: report.weaknesses[i].contacts]
-        smaller = divided(scene, [i, *grouped[i]], contacts, start.keep) if i in grouped and len(contacts) else None
+        smaller = divided(scene, [i, *grouped[i]], contacts, start.keep)
         if smaller is not None:
             del grouped[i]
             grouped |= smaller
             anew.add(i)
+    if not anew:
+        return whole
     begun, open_cells, spent = (
         {i: number for i, number in known.items() if i not in anew} for known in (whole.begun, whole.open_cells, whole.spent)
     )
     return replace(whole, together=grouped, begun=begun, open_cells=open_cells, spent=spent)
 
 
-def _corners(scene: Scene, pair: int, weakness: Weakness, most: float) -> list[tuple[tuple[int, ...], Array, float]]:
-    """Returns what is to be cut off for a pair: its contacts, which have to go sooner or later, and other points where it fails."""
-    joints, points, k = joints_between(scene, pair), weakness.points, weakness.contacts
-    return [(joints, points[:k], max(most, CONTACT_LOSS)), (weakness.joints or joints, points[k:], most)]
+def _made(
+    scene: Scene, state: GrowthState, start: Start, whole: Whole, report: Outcomes, failing: Sequence[int], beyond: float = 0.0
+) -> Cut:
+    """Cuts off what is to be cut off for pairs: contacts, which have to go sooner or later, and other points where they fail."""
+    corners = []
+    for i in failing:
+        weakness, joints, most = report.weaknesses[i], joints_between(scene, i), _most_loss(state, whole, i, report)
+        points, k = weakness.points, weakness.contacts
+        corners += [(joints, points[:k], max(most, CONTACT_LOSS)), (weakness.joints or joints, points[k:], most)]
+    around = start.rows if whole.reach >= 1 else _copy(scene, start, whole.reach)
+    return cut(scene, whole.polytope, start.keep, corners, around, beyond)
 
 
 def _obstacles(stage: int, failing: Sequence[int], cut: Cut) -> dict[int, Obstacle]:
@@ -200,12 +212,9 @@ def _obstacles(stage: int, failing: Sequence[int], cut: Cut) -> dict[int, Obstac
     return found
 
 
-def _most_loss(state: GrowthState, whole: Whole, pair: int, hard: int) -> float:
-    """Returns which share of the polytope the faces for a pair may lose in this round, for points that are no contacts.
-
-    Args:
-        hard: open cells of the pair are cut off after this many cells.
-    """
+def _most_loss(state: GrowthState, whole: Whole, pair: int, report: Outcomes) -> float:
+    """Returns which share of the polytope the faces for a pair may lose in this round, for points that are no contacts."""
+    hard = 0 if report.weaknesses[pair].joints else HARD
     if _gone(whole) >= LATE:
         return float(min(LATE_LOSS * 2.0 ** ((_gone(whole) - LATE) / LATER), 1.0))
     effort, spent = _effort(state, whole, pair), whole.spent[pair]

@@ -20,7 +20,8 @@ from certifier.proof import limits
 THIN = 8
 """One in this many samples of a polytope is enough to say which pairs share one certificate."""
 LOST = 0.002
-"""Two volumes touch at no more than this share of the samples. Samples at which two of the geometries themselves touch do not count."""
+"""Two volumes touch at no more than this share of the samples. Samples at which two of the geometries themselves touch do not count.
+Faces for the contacts of two volumes lose no more than this share in one round of a growth, where the group can be divided."""
 ROOM = 0.5
 """At the points to keep, two volumes keep at least this part of the distance of the geometries."""
 MARGIN = 1e-9

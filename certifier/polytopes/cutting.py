@@ -59,10 +59,12 @@ class Cut:
         polytope: the polytope with faces that cut points off, itself where no face loses little enough; None where nothing can be cut off
             without a point to keep.
         made: for each corner, the result of its faces.
+        around: the polytope whose samples were used last, for the next round.
     """
 
     polytope: Polytope | None
     made: list[Made]
+    around: Polytope
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,14 +99,17 @@ def cut(
         keep: (k, n) points that stay inside.
         corners: for each pair that failed, the joints between its bodies, the points (w, n) to cut off, and the share of the polytope that
             its faces may lose together.
-        around: a polytope of which this one is a part, the same one for all rounds; its samples are drawn once.
+        around: a polytope of which this one is a part; its samples are used where ENOUGH of them are in this one. They are drawn once, if
+            one round after the other receives the polytope that the round before returns.
         beyond: points that are beyond a face by less than this are not cut off yet.
     """
+    if not any(len(points) for _, points, _ in corners):
+        return Cut(polytope, [Made()] * len(corners), around)
     limits = 2 * scene.n
     samples = samples_of(scene, around)
     samples = samples[polytope.contains(samples)]
     if len(samples) < ENOUGH:
-        samples = samples_of(scene, polytope)
+        around, samples = polytope, samples_of(scene, polytope)
     scale = np.where(samples.std(axis=0) > 0, samples.std(axis=0), 1.0)
     C, d = polytope.C, polytope.d.copy()
     blocked = False
@@ -147,12 +152,13 @@ def cut(
             left_to_lose -= loss
             samples = samples[samples @ best.row <= best.offset]
             if len(samples) < FEWEST:
-                samples = samples_of(scene, Polytope(C, d))
+                around = Polytope(C, d)
+                samples = samples_of(scene, around)
         worst = max(losses, key=lambda lost: lost[0], default=(0.0, None))
         made.append(Made(len(losses), lost_together(*(loss for loss, _ in losses)), worst[1]))
     if not any(one.faces for one in made):
-        return Cut(None if blocked else polytope, made)
-    return Cut(Polytope(C, d), made)
+        return Cut(None if blocked else polytope, made, around)
+    return Cut(Polytope(C, d), made, around)
 
 
 @dataclass(frozen=True, eq=False)

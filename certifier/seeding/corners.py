@@ -48,10 +48,11 @@ def without_contacts(scene: Scene, polytope: Polytope, points: Array) -> Polytop
         tell(faces=len(polytope.d) - 2 * scene.n)
         found = list(_found(apart, polytope, active, seed))
         if found:
-            smaller = cut(scene, polytope, points, [(joints, contacts, 1.0) for _, joints, contacts in found], around, BARELY).polytope
-            if smaller is None or smaller is polytope:
+            made = cut(scene, polytope, points, [(joints, contacts, 1.0) for _, joints, contacts in found], around, BARELY)
+            if made.polytope is None or made.polytope is polytope:
                 break
-            polytope, active = smaller, {first: pieces[first] for first, _, _ in found}
+            polytope, around = made.polytope, made.around
+            active = {first: pieces[first] for first, _, _ in found}
         elif active is pieces or looks == LOOKS:
             break
         else:

@@ -28,7 +28,7 @@ from certifier.scene.hull import nearest_in_hull
 from certifier.seeding.coarse_pairs import coarse_pairs_of, with_coarse_pairs
 from certifier.seeding.contacts import Contacts
 from certifier.seeding.options import SeedOptions
-from certifier.seeding.trim import trimmed
+from certifier.seeding.trim import Trim
 
 START_RADIUS = 1e-2
 """The first ellipsoid is a ball in s with this radius."""
@@ -45,10 +45,10 @@ BESIDE = 2
 BESIDE_ITERATIONS = 2
 """At most this many alternations follow each choice."""
 
-AGAIN, LEAST_KEPT = 3, 0.6
-"""Where the ellipsoid in the region is narrower by this factor than one of the alternations, everything is tried again with other random
-numbers, AGAIN times at most in all. Then what collides lies between the seed and most of the polytope, or next to the seed, and cutting it
-off has left a sliver."""
+AGAIN, LEAST_KEPT = 2, 0.6
+"""Where the ellipsoid in what the samples leave is narrower by this factor than one of the alternations, all of this is tried again with
+other random numbers, AGAIN times at most in all. Then what collides lies between the seed and most of the polytope, or next to the seed,
+and cutting it off may have left a sliver."""
 
 
 def iris(scene: Scene, points: Array, options: SeedOptions) -> tuple[Array, Array, dict[str, Any]]:
@@ -75,7 +75,9 @@ def iris(scene: Scene, points: Array, options: SeedOptions) -> tuple[Array, Arra
         if best.kept >= LEAST_KEPT:
             break
     assert best is not None, "there is a first time"
-    turn, polytope, passed = best.turn, best.polytope, best.passed
+    turn, trim = best.turn, best.trim
+    trim.by_descents()
+    polytope, passed = trim.polytope, trim.passed
     C, d = needed_faces(scene, polytope.C[: -2 * scene.n], polytope.d[: -2 * scene.n], points)
     guarantee = Guarantee.SAMPLED if passed else Guarantee.NONE
     warnings = [] if passed else [f"more than {options.epsilon:g} of the polytope may collide: too many faces would be needed"]
@@ -89,20 +91,19 @@ class _Found:
 
     Attributes:
         turn: the last of the alternations.
-        polytope: the part of its polytope that faces leave, with the largest ellipsoid inside.
-        passed: as :func:`certifier.seeding.trim.trimmed` says.
+        trim: what samples show to collide is cut off its polytope.
+        ellipsoid: the largest one in the polytope of ``trim``.
         kept: how wide this ellipsoid is, as a part of the widest one of the alternations, in the mean over all directions.
     """
 
     turn: _Turn
-    polytope: Polytope
-    passed: bool
+    trim: Trim
     ellipsoid: Ellipsoid
     kept: float
 
 
 def _found(scene: Scene, points: Array, options: SeedOptions, rng: np.random.Generator) -> _Found:
-    """Alternates between faces and ellipsoid, and cuts off the corners that collide."""
+    """Alternates between faces and ellipsoid, and cuts off the corners that samples show to collide."""
     contacts, limits = Contacts(scene), scene.polytope([], [])
     samples = hit_and_run(limits, points[0], SAMPLES, int(rng.integers(2**31)))
     few = min(MOST, FEW * float((~contacts.free(samples)).mean()))
@@ -117,9 +118,10 @@ def _found(scene: Scene, points: Array, options: SeedOptions, rng: np.random.Gen
         contacts = Contacts(with_coarse_pairs(scene, coarse))
         turn = _alternated(contacts, points, begin, few, BESIDE_ITERATIONS, options, rng)
         widest = max(widest, turn.ellipsoid.volume)
-    polytope, passed = trimmed(scene, turn.polytope, points, options, rng)
-    ellipsoid = inscribed_ellipsoid(polytope)
-    return _Found(turn, polytope, passed, ellipsoid, float((ellipsoid.volume / widest) ** (1 / scene.n)))
+    trim = Trim(scene, turn.polytope, points, options, rng)
+    trim.by_samples()
+    ellipsoid = inscribed_ellipsoid(trim.polytope)
+    return _Found(turn, trim, ellipsoid, float((ellipsoid.volume / widest) ** (1 / scene.n)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,15 +3,15 @@
 Samples that are uniform in q show where something touches. One of the geometries, or of the volumes that growth will keep apart by faces
 (:mod:`certifier.seeding.coarse_pairs`), is enough. What is cut off here costs growth no cell.
 
-Growth begins with a small copy of the proposal about the seed. A seed in a narrow place has contacts all about it, but of the whole
-proposal they take up next to nothing. So samples of copies of several sizes are looked at as well.
+A seed in a narrow place has contacts all about it, which samples of the whole polytope do not show. So small copies of the polytope about
+the seed come first. Faces for them leave little of what is wide elsewhere, and of the rest few corners collide. In the other order, a sliver
+often remains, because the faces that were made before do not go with those near the seed.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -31,82 +31,75 @@ EACH = 40
 """This many samples come from one chain."""
 PASSES = 0.5
 """The polytope passes if at most this part of epsilon of the samples collides."""
-SIZES, LOOKED_AT, FEW = (0.1, 0.15, 0.2, 0.3, 0.45, 0.7), 2000, 1
+SIZES, LOOKED_AT, FEW = (0.1, 0.15, 0.2, 0.3, 0.45, 0.7), 2000, 10
 """Copies of these sizes about the seed are cut until at most FEW of LOOKED_AT samples collide."""
 
 
-def trimmed(scene: Scene, polytope: Polytope, points: Array, options: SeedOptions, rng: np.random.Generator) -> tuple[Polytope, bool]:
-    """Returns the part of a polytope that faces leave, and whether it has passed the test.
-
-    The test looks at N samples that are nearly independent and uniform in q. If more than epsilon of the volume in q collides, it fails
-    with the probability 1 - delta (a Chernoff bound, as in Drake's IRIS).
-
-    Args:
-        polytope: joint limits included, as its last rows.
-        points: (k, n) points in s that stay inside.
-
-    Raises:
-        RegionError: the polytope is empty or unbounded.
-    """
-    coarse = coarse_pairs_of(scene, polytope, points)
-    wider = with_coarse_pairs(scene, coarse) if coarse else scene
-    trim = _Trim(scene, polytope, points, options.max_iterations_separating_planes)
-    count = math.ceil(2 * math.log(1 / options.delta) / (options.epsilon * PASSES**2) / EACH)
-    few = PASSES * options.epsilon * count * EACH
-
-    def of_all() -> Array:
-        return uniform_in_q(trim.polytope, scene, count, EACH, int(rng.integers(2**31))).reshape(-1, scene.n)
-
-    def of_copy(size: float) -> Array:
-        C, d = trim.polytope.C, trim.polytope.d
-        copy = Polytope(C, C @ points[0] + size * (d - C @ points[0]))
-        return hit_and_run(copy, points[0], LOOKED_AT, int(rng.integers(2**31)))
-
-    passed, whole = trim.until_few(wider, of_all, few), trim.polytope
-    for size in SIZES:
-        trim.until_few(scene, partial(of_copy, size), FEW)
-    trim.polytope = without_contacts(scene, trim.polytope, points)
-    if trim.polytope is not whole:
-        passed = trim.until_few(wider, of_all, few)
-    return trim.polytope, passed
-
-
-@dataclass
-class _Trim:
-    """Cuts corners off a polytope.
+class Trim:
+    """Cuts the corners that collide off a polytope.
 
     Attributes:
         polytope: the polytope as it is now.
-        points: (k, n) points in s that stay inside.
-        rounds: at most this many are made until few samples collide.
+        passed: whether the test of the last look at all of it was passed. It looks at N samples that are nearly independent and uniform in
+            q. If more than epsilon of the volume in q collides, it fails with the probability 1 - delta (a Chernoff bound, as in Drake's
+            IRIS).
     """
 
-    scene: Scene
-    polytope: Polytope
-    points: Array
-    rounds: int
+    def __init__(self, scene: Scene, polytope: Polytope, points: Array, options: SeedOptions, rng: np.random.Generator) -> None:
+        """Begins with a polytope.
 
-    def __post_init__(self) -> None:
-        self._around = self.polytope
+        Args:
+            polytope: joint limits included, as its last rows.
+            points: (k, n) points in s that stay inside, the seed first.
 
-    def until_few(self, wider: Scene, drawn: Callable[[], Array], few: float) -> bool:
+        Raises:
+            RegionError: here and later: the polytope is empty or unbounded.
+        """
+        self.polytope, self.passed = polytope, False
+        self._scene, self._points, self._rng, self._around = scene, points, rng, polytope
+        coarse = coarse_pairs_of(scene, polytope, points)
+        self._wider = with_coarse_pairs(scene, coarse) if coarse else scene
+        self._rounds = options.max_iterations_separating_planes
+        self._count = math.ceil(2 * math.log(1 / options.delta) / (options.epsilon * PASSES**2) / EACH)
+        self._few = PASSES * options.epsilon * self._count * EACH
+
+    def by_samples(self) -> None:
+        """Cuts off what samples show: first of small copies about the seed, then of all of the polytope."""
+        for size in SIZES:
+            self._until_few(self._scene, partial(self._of_copy, size), FEW)
+        self.passed = self._until_few(self._wider, self._of_all, self._few)
+
+    def by_descents(self) -> None:
+        """Cuts off the contacts that descents find, and what samples show then."""
+        before, self.polytope = self.polytope, without_contacts(self._scene, self.polytope, self._points)
+        if self.polytope is not before:
+            self.passed = self._until_few(self._wider, self._of_all, self._few)
+
+    def _of_all(self) -> Array:
+        return uniform_in_q(self.polytope, self._scene, self._count, EACH, int(self._rng.integers(2**31))).reshape(-1, self._scene.n)
+
+    def _of_copy(self, size: float) -> Array:
+        C, d, seed = self.polytope.C, self.polytope.d, self._points[0]
+        return hit_and_run(Polytope(C, C @ seed + size * (d - C @ seed)), seed, LOOKED_AT, int(self._rng.integers(2**31)))
+
+    def _until_few(self, wider: Scene, drawn: Callable[[], Array], few: float) -> bool:
         """Cuts off what collides of samples, drawn anew for each round, until at most ``few`` do; returns whether that is so.
 
         Args:
             wider: the scene, perhaps with coarse volumes.
         """
         contacts = Contacts(wider)
-        for _ in range(self.rounds):
-            tell(faces=len(self.polytope.d) - 2 * self.scene.n)
+        for _ in range(self._rounds):
+            tell(faces=len(self.polytope.d) - 2 * self._scene.n)
             samples = drawn()
             colliding = samples[~contacts.free(samples)]
             if len(colliding) <= few:
                 return True
             corners = [(_joints(wider, pair), found, 1.0) for pair, found in contacts.touching(colliding).items()]
-            smaller = cut(self.scene, self.polytope, self.points, corners, self._around).polytope
-            if smaller is None or smaller is self.polytope:
+            made = cut(self._scene, self.polytope, self._points, corners, self._around)
+            if made.polytope is None or made.polytope is self.polytope:
                 break
-            self.polytope = smaller
+            self.polytope, self._around = made.polytope, made.around
         return False
 
 

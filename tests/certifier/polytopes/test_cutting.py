@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from certifier.model import JointKind
+from certifier.polytopes import cutting
 from certifier.polytopes.cutting import BARELY, cut
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
 from certifier.polytopes.gibbs import uniform_in_q
@@ -64,6 +65,34 @@ def test_a_face_lies_in_the_joints_between_the_bodies(seed, joints):
     others = [j for j in range(3) if j not in joints]
     assert len(faces)
     assert (faces[:, others] == 0).all()
+
+
+def test_samples_are_drawn_once_for_many_rounds(monkeypatch):
+    """Of the whole joint space, this polytope has too few samples; those of its own serve the next round too."""
+    scene, rng, drawn = planar_arm(3), np.random.default_rng(0), []
+
+    def draw(polytope, *arguments):
+        drawn.append(polytope)
+        return uniform_in_q(polytope, *arguments)
+
+    monkeypatch.setattr(cutting, "uniform_in_q", draw)
+    limits, keep = scene.polytope([], []), np.zeros((1, 3))
+    polytope = scene.polytope(np.concatenate([np.eye(3), -np.eye(3)]), [0.05] * 6)
+    first = cut(scene, polytope, keep, [(ALL, corner_of(scene, polytope, rng), 1.0)], limits)
+    assert first.around is polytope
+    second = cut(scene, first.polytope, keep, [(ALL, corner_of(scene, first.polytope, rng), 1.0)], first.around)
+    assert second.polytope is not first.polytope
+    assert second.around is polytope
+    assert [id(one) for one in drawn] == [id(limits), id(polytope)]
+
+
+def test_nothing_to_cut_off_draws_no_samples(monkeypatch):
+    scene = planar_arm(3)
+    monkeypatch.setattr(cutting, "uniform_in_q", None)
+    polytope = scene.polytope([], [])
+    made = cut(scene, polytope, np.zeros((1, 3)), [(ALL, np.empty((0, 3)), 1.0)], polytope)
+    assert made.polytope is polytope
+    assert [one.faces for one in made.made] == [0]
 
 
 def test_contacts_along_a_face_take_no_new_face():
