@@ -31,7 +31,7 @@ FIRST = 0.7
 """In the first stage the faces of the proposal lie this part of their distance from the seed."""
 FARTHEST, FARTHER, FAR = 1.45, 1.25, 1.2
 """The faces of the region of the first stage move out to FARTHEST times their distance from the seed, and those of others to FAR times."""
-SOON = 0.15
+SOON = 0.25
 """When the first stage has taken more than this share of the time until the deadline, its faces move out to FARTHER times only."""
 GAIN = 0.02
 """Growth ends with a stage that gains less than this share of the proposal."""

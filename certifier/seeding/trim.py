@@ -4,8 +4,8 @@ Samples that are uniform in q show where something touches. One of the geometrie
 (:mod:`certifier.seeding.coarse_pairs`), is enough. What is cut off here costs growth no cell.
 
 A seed in a narrow place has contacts all about it, which samples of the whole polytope do not show. So small copies of the polytope about
-the seed come first. Faces for them leave little of what is wide elsewhere, and of the rest few corners collide. In the other order, a sliver
-often remains, because the faces that were made before do not go with those near the seed.
+the seed come first. Faces for them leave little of what is wide elsewhere, and of the rest few corners collide. In the other order, faces
+for the rest do not go with those near the seed, and often a sliver remains.
 """
 
 from __future__ import annotations
