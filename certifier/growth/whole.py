@@ -137,8 +137,7 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
         return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing is known of where they fail")
     failing = [i for i in report.failures if report.open_cells.get(i) != 0]
     made = _made(scene, state, start, whole, report, failing)
-    costly = [i for i, contacts in zip(failing, made.made[::2], strict=True) if contacts.lost > LOST]
-    anew = _regrouped(scene, start, whole, report, costly)
+    anew = _regrouped(scene, start, whole, report, _costly(report, failing, made))
     if anew is not whole:
         whole, failing = anew, [i for i in failing if i in anew.begun]
         made = _made(scene, state, start, whole, report, failing)
@@ -164,13 +163,24 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     return _next(scene, replace(state, whole=replace(whole, polytope=smaller, cuts=cuts)))
 
 
+def _costly(report: Outcomes, failing: Sequence[int], made: Cut) -> list[int]:
+    """Returns the pairs whose contacts faces cut off at the cost of more than a group may lose, or do not cut off at all."""
+    found = []
+    for i, of_contacts in zip(failing, made.made[::2], strict=True):
+        weakness = report.weaknesses[i]
+        contacts = weakness.points[: weakness.contacts]
+        if of_contacts.lost > LOST or (len(contacts) and (made.polytope is None or made.polytope.contains(contacts).any())):
+            found.append(i)
+    return found
+
+
 def _regrouped(scene: Scene, start: Start, whole: Whole, report: Outcomes, costly: Sequence[int]) -> Whole:
     """Divides those of the costly groups of pairs whose volumes touch where none of their geometries do.
 
     The pairs of such a group begin anew in the next round, in smaller groups or alone. This takes longer than a few faces.
 
     Args:
-        costly: pairs whose faces lose more than a group may.
+        costly: pairs, as :func:`_costly` returns them.
     """
     grouped, anew = dict(whole.together), set()
     for i in (i for i in costly if i in grouped):

@@ -111,6 +111,16 @@ def test_growth_divides_a_group_that_touches_and_no_face_is_needed(monkeypatch):
     assert other.manifest["share"]["value"] < 0.9
 
 
+def test_growth_divides_a_group_that_touches_where_no_face_can_be(monkeypatch):
+    """As before, and a configuration at which the hull touches has to stay inside: nothing is cut off, so nothing is lost either."""
+    scene = beads(4, 0.6, 0.05, box("world/obstacle", WORLD, (0.1, 0.1, 0.1), (1.2, 0.35, 0.0)))
+    scene = replace(scene, pairs=scene.pairs[:4])
+    monkeypatch.setattr(whole, "together", lambda *_: {0: (1, 2, 3)})
+    region = grow(scene, GrowthOptions(seed=box_seed([0.0, 0.0], 0.25) | {"contain": [[0.24, 0.0]]}, cells=600))
+    assert proved(scene, region) > 1
+    assert region.manifest["share"]["value"] == 1
+
+
 def test_a_configuration_to_keep_divides_a_hull_that_no_sample_does():
     scene = beads(4, 0.6, 0.05, box("world/obstacle", WORLD, (0.1, 0.1, 0.1), (1.2, 0.0, 0.0)))
     away = samples(scene) + np.array([1.2, 0.0])
