@@ -137,9 +137,8 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
         return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing is known of where they fail")
     failing = [i for i in report.failures if report.open_cells.get(i) != 0]
     made = _made(scene, state, start, whole, report, failing)
-    anew = _regrouped(scene, start, whole, report, _costly(report, failing, made))
-    if anew is not whole:
-        whole, failing = anew, [i for i in failing if i in anew.begun]
+    while (smaller_groups := _regrouped(scene, start, whole, report, _costly(whole, report, failing, made))) is not whole:
+        whole, failing = smaller_groups, [i for i in failing if i in smaller_groups.begun]
         made = _made(scene, state, start, whole, report, failing)
     if not failing:
         return _next(scene, replace(state, whole=whole))
@@ -163,8 +162,13 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     return _next(scene, replace(state, whole=replace(whole, polytope=smaller, cuts=cuts)))
 
 
-def _costly(report: Outcomes, failing: Sequence[int], made: Cut) -> list[int]:
-    """Returns the pairs whose contacts faces cut off at the cost of more than a group may lose, or do not cut off at all."""
+def _costly(whole: Whole, report: Outcomes, failing: Sequence[int], made: Cut) -> list[int]:
+    """Returns the pairs whose contacts faces cut off at the cost of more than a group may lose, or do not cut off at all.
+
+    When a stage is late, it is too late for new cells, except where nothing can be cut off.
+    """
+    if _gone(whole) >= LATE and made.polytope is not None and made.polytope is not whole.polytope:
+        return []
     found = []
     for i, of_contacts in zip(failing, made.made[::2], strict=True):
         weakness = report.weaknesses[i]

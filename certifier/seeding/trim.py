@@ -4,8 +4,8 @@ Samples that are uniform in q show where something touches. One of the geometrie
 (:mod:`certifier.seeding.coarse_pairs`), is enough. What is cut off here costs growth no cell.
 
 A seed in a narrow place has contacts all about it, which samples of the whole polytope do not show. So small copies of the polytope about
-the seed come first. Faces for them leave little of what is wide elsewhere, and of the rest few corners collide. In the other order, faces
-for the rest do not go with those near the seed, and often a sliver remains.
+the seed are cut first. Faces near the seed cut much of the rest off as well, so few corners of the rest collide then. In the other order,
+the faces of both often leave a sliver.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ EACH = 40
 PASSES = 0.5
 """The polytope passes if at most this part of epsilon of the samples collides."""
 SIZES, LOOKED_AT, FEW = (0.1, 0.15, 0.2, 0.3, 0.45, 0.7), 2000, 10
-"""Copies of these sizes about the seed are cut until at most FEW of LOOKED_AT samples collide."""
+"""Copies of these sizes about the seed are cut, one after the other, until at most FEW of LOOKED_AT samples of a copy collide."""
 
 
 class Trim:

@@ -27,6 +27,8 @@ from certifier.model import WORLD, Polytope
 from certifier.outcome import Outcome
 from certifier.pair.collisions import in_collision
 from certifier.pair.result import Weakness
+from certifier.partition.together import LOST
+from certifier.polytopes.cutting import Cut, Made
 from certifier.polytopes.gibbs import uniform_in_q
 from certifier.scene import load_scene
 from certifier.seeding.proposal import Proposal
@@ -209,6 +211,29 @@ def test_rounds_of_many_pairs_are_shorter_when_a_stage_is_late(passed, parts):
         1.2, 0.5, SCENE.polytope([], []), *np.zeros((2, 2)), *np.zeros((2, 2, 8)), open_cells=dict.fromkeys(pairs, 50), passed=passed
     )
     assert whole._parts(pairs, state) == (dict.fromkeys(pairs, parts) if parts > 1 else {})
+
+
+@pytest.mark.parametrize(
+    ("lost", "cut", "passed", "costly"),
+    [
+        (LOST, "off", 0.0, False),
+        (1.01 * LOST, "off", 0.0, True),
+        (0.0, "not", 0.0, True),  # a face would lose more than it may
+        (0.0, "impossible", 0.0, True),  # a configuration to keep is in the way
+        (1.01 * LOST, "off", LATE, False),
+        (0.0, "not", LATE, True),  # nothing at all was cut off
+        (0.0, "impossible", LATE, True),
+    ],
+)
+def test_contacts_are_costly_where_faces_lose_much_or_there_are_none(lost, cut, passed, costly):
+    polytope = SCENE.polytope([], [])
+    smaller = {"off": SCENE.polytope([[1.0, 0.0]], [0.5]), "not": polytope, "impossible": None}[cut]
+    state = Whole(1.2, 0.5, polytope, *np.zeros((2, 2)), *np.zeros((2, 2, 8)), passed=passed)
+    report = SimpleNamespace(weaknesses={3: Weakness(CORNER, np.zeros(2), contacts=len(CORNER))})
+    made = Cut(smaller, [Made(int(lost > 0), lost), Made()], polytope)
+    assert whole._costly(state, report, [3], made) == ([3] if costly else [])
+    report.weaknesses[3] = Weakness(CORNER, np.zeros(2))  # no contacts, but points where a plane is missing
+    assert whole._costly(state, report, [3], Cut(smaller, [Made(), Made(1, 0.1)], polytope)) == []
 
 
 @pytest.mark.parametrize(("touching", "when"), [(True, LATE), (False, LATEST)])

@@ -76,6 +76,7 @@ def test_samples_are_drawn_once_for_many_rounds(monkeypatch):
         return uniform_in_q(polytope, *arguments)
 
     monkeypatch.setattr(cutting, "uniform_in_q", draw)
+    cutting.samples_of.cache.clear()
     limits, keep = scene.polytope([], []), np.zeros((1, 3))
     polytope = scene.polytope(np.concatenate([np.eye(3), -np.eye(3)]), [0.05] * 6)
     first = cut(scene, polytope, keep, [(ALL, corner_of(scene, polytope, rng), 1.0)], limits)
@@ -88,7 +89,7 @@ def test_samples_are_drawn_once_for_many_rounds(monkeypatch):
 
 def test_nothing_to_cut_off_draws_no_samples(monkeypatch):
     scene = planar_arm(3)
-    monkeypatch.setattr(cutting, "uniform_in_q", None)
+    monkeypatch.setattr(cutting, "samples_of", None)
     polytope = scene.polytope([], [])
     made = cut(scene, polytope, np.zeros((1, 3)), [(ALL, np.empty((0, 3)), 1.0)], polytope)
     assert made.polytope is polytope
