@@ -32,7 +32,7 @@ FIRST = 0.7
 FARTHEST, FARTHER, FAR = 1.45, 1.25, 1.2
 """The faces of the region of the first stage move out to FARTHEST times their distance from the seed, and those of others to FAR times."""
 SOON = 0.25
-"""When the first stage has taken more than this share of the time until the deadline, its faces move out to FARTHER times only."""
+"""When more than this share of the job's time has passed after the first stage, its faces move out to FARTHER times only."""
 GAIN = 0.02
 """Growth ends with a stage that gains less than this share of the proposal."""
 SLICE = 100
@@ -136,10 +136,10 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
         pair = scene.pairs[unknown]
         return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing is known of where they fail")
     failing = [i for i in report.failures if report.open_cells.get(i) != 0]
-    made = _made(scene, state, start, whole, report, failing)
+    made = _cut_off(scene, state, start, whole, report, failing)
     while (smaller_groups := _regrouped(scene, start, whole, report, _costly(whole, report, failing, made))) is not whole:
         whole, failing = smaller_groups, [i for i in failing if i in smaller_groups.begun]
-        made = _made(scene, state, start, whole, report, failing)
+        made = _cut_off(scene, state, start, whole, report, failing)
     if not failing:
         return _next(scene, replace(state, whole=whole))
     final = {*action.ending} & {*action.hard}
@@ -147,7 +147,7 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     named = any(len(report.weaknesses[i].points) for i in failing)
     stuck = named and made.polytope is whole.polytope and all(i in final and _most_loss(state, whole, i, report) >= 1 for i in failing)
     if stuck:  # A contact on a face would be found again and again.
-        made = _made(scene, state, start, whole, report, failing, BARELY)
+        made = _cut_off(scene, state, start, whole, report, failing, BARELY)
     smaller = made.polytope
     state = replace(state, obstacles=joined(state.obstacles, _obstacles(whole.stage, failing, made)))
     if stuck and smaller is whole.polytope:
@@ -202,7 +202,7 @@ def _regrouped(scene: Scene, start: Start, whole: Whole, report: Outcomes, costl
     return replace(whole, together=grouped, begun=begun, open_cells=open_cells, spent=spent)
 
 
-def _made(
+def _cut_off(
     scene: Scene, state: GrowthState, start: Start, whole: Whole, report: Outcomes, failing: Sequence[int], beyond: float = 0.0
 ) -> Cut:
     """Cuts off what is to be cut off for pairs: contacts, which have to go sooner or later, and other points where they fail."""

@@ -10,11 +10,15 @@ import pytest
 
 from certifier.errors import ProofError
 from certifier.growth import whole
+from certifier.growth.actions import Outcomes
+from certifier.growth.machine import begin
 from certifier.growth.options import GrowthOptions
+from certifier.growth.state import Start
 from certifier.jobs.local import grow, recertify
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Pair, Polytope
 from certifier.outcome import Outcome
+from certifier.pair.result import Weakness
 from certifier.partition.certification import CellCertification
 from certifier.partition.hulls import gaps, hull
 from certifier.partition.together import LOST, divided, together, volumes_of
@@ -119,6 +123,20 @@ def test_growth_divides_a_group_that_touches_where_no_face_can_be(monkeypatch):
     region = grow(scene, GrowthOptions(seed=box_seed([0.0, 0.0], 0.25) | {"contain": [[0.24, 0.0]]}, cells=600))
     assert proved(scene, region) > 1
     assert region.manifest["share"]["value"] == 1
+
+
+def test_a_group_is_divided_although_faces_for_another_one_cut_its_contacts_off(monkeypatch):
+    """The first group pays for the faces at one place. When it is divided, the second one has to."""
+    scene, groups, contacts = beads(), {0: (1, 2, 3), 4: (5, 6, 7)}, np.array([[0.5, 0.5], [0.52, 0.5]])
+    monkeypatch.setattr(whole, "together", lambda *_: groups)
+    monkeypatch.setattr(whole, "divided", lambda *_: {})
+    start = Start(scene.polytope(np.concatenate([np.eye(2), -np.eye(2)]), [1.0] * 4), KEEP[0], KEEP)
+    begun = whole.begin_whole(scene, replace(begin(scene, GrowthOptions(seed={})).state, start=start), start)
+    touching = Outcome.INCONCLUSIVE, Weakness(contacts, np.zeros(2), contacts=len(contacts)), 1
+    reached = [(i, *(touching if i in groups else (Outcome.CERTIFIED, None, None))) for i, _ in begun.action.work]
+    following = whole.after_cells(scene, begun.state, start, Outcomes.of_parts(begun.action, reached))
+    assert following.state.whole.together == {}
+    assert following.state.whole.polytope is begun.state.whole.polytope
 
 
 def test_a_configuration_to_keep_divides_a_hull_that_no_sample_does():
