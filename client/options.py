@@ -16,6 +16,7 @@ from typing import Any
 from certifier.errors import CirisError
 from certifier.growth.options import CertifyOptions, GrowthOptions, RecertifyOptions
 from certifier.jobs.options import JobOptions
+from certifier.map.options import MapOptions
 from certifier.options import Option, Takes, table
 from certifier.seeding.options import GIVEN, SeedOptions
 from planner.cover.options import CoverOptions
@@ -66,6 +67,7 @@ class Part:
 JOB = (Part(JobOptions),)
 GROW = (Part(SeedOptions, "seed", (SEED.name, *GIVEN)), Part(GrowthOptions, "options"), *JOB)
 COVER = (Part(CoverOptions, "options"), *JOB)
+MAP = (Part(MapOptions, "options"), *JOB)
 CERTIFY = (Part(CertifyOptions), *JOB)
 RECERTIFY = (Part(RecertifyOptions), *JOB)
 

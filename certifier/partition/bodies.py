@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from certifier.model import Array, Volume
 from certifier.partition import planes
 from certifier.partition.area import Area
 from certifier.partition.cell import Cell
-from certifier.partition.chords import chords
-from certifier.partition.hulls import approach, gaps, hull
-from certifier.partition.sides import Side
+from certifier.partition.chords import chords, within
+from certifier.partition.hulls import Hull, approach, gaps, hull
+from certifier.partition.multipliers import PROVED
+from certifier.partition.sides import Moving, Proofs, Side, prove_side, room_for
 from certifier.partition.tree import Streams, joined
 
 CHORDS = 40
@@ -72,36 +74,56 @@ class Undecided:
     joint: int | None = None
 
 
+class Pair(NamedTuple):
+    """Two volumes as compiled loops see them.
+
+    Attributes:
+        a, b: the bodies in the space of the search.
+        first, second: the same in the frame of the plane, the positive side first.
+        joints: (k,) position indices of those that move one volume against the other, ascending.
+        middle, extent: where the space of the search is in the frame, and its unit, in metres.
+        rounded: whether a radius is positive.
+        pieces: a vertex may take this many.
+    """
+
+    a: Hull
+    b: Hull
+    first: Moving
+    second: Moving
+    joints: Array
+    middle: Array
+    extent: float
+    rounded: bool
+    pieces: int
+
+
 class Bodies:
     """Two volumes, in the frame of the plane.
 
     Attributes:
         volumes: the two volumes.
         joints: position indices of those that move one volume against the other, ascending.
-        hulls: the bodies, in the space of the search.
+        pair, hulls: the bodies as compiled loops see them; in the space of the search.
         extent: half the size of the space that their vertices are seen in, in metres.
     """
 
     def __init__(self, area: Area, frame: str, volumes: tuple[Volume, Volume]) -> None:
         self._area, self.volumes = area, volumes
-        self._radii = [volume.radius + area.scene.padding_between(volumes) for volume in volumes]
+        radii = [volume.radius + area.scene.padding_between(volumes) for volume in volumes]
         # A joint between the frame and both bodies moves neither against the other, but stays in the plane's frame.
         self.joints = sorted({joint for volume in volumes for joint in area.kinematics.chain(frame, volume.body)})
         self._sides = [
-            Side(area, frame, volume, self.joints, sign, radius)
-            for volume, sign, radius in zip(volumes, (1.0, -1.0), self._radii, strict=True)
+            Side(area, frame, volume, self.joints, sign, radius) for volume, sign, radius in zip(volumes, (1.0, -1.0), radii, strict=True)
         ]
         seen = [area.kinematics.points(frame, volume.body, volume.vertices, area.samples[:64]).reshape(-1, 3) for volume in volumes]
         points = np.concatenate(seen)
-        self._middle = (points.min(axis=0) + points.max(axis=0)) / 2
-        self.extent = float(np.abs(points - self._middle).max()) or 1.0  # all vertices may be one point
-        self.hulls = tuple(
-            hull(area.kinematics, frame, volume, radius, self._middle, self.extent)
-            for volume, radius in zip(volumes, self._radii, strict=True)
-        )
-        self._pieces = PIECES if len(self.joints) <= FEW_JOINTS else MANY_PIECES
-        signs = np.array(list(itertools.product((False, True), repeat=min(len(self.joints), 12))))
-        self._corners = signs if len(signs) <= CORNERS else None
+        middle = (points.min(axis=0) + points.max(axis=0)) / 2
+        self.extent = float(np.abs(points - middle).max()) or 1.0  # all vertices may be one point
+        a, b = (hull(area.kinematics, frame, volume, radius, middle, self.extent) for volume, radius in zip(volumes, radii, strict=True))
+        self.hulls = a, b
+        pieces = PIECES if len(self.joints) <= FEW_JOINTS else MANY_PIECES
+        first, second = (side.moving for side in self._sides)
+        self.pair = Pair(a, b, first, second, np.array(self.joints, np.int64), middle, self.extent, max(radii) > 0, pieces)
 
     def separate(self, cell: Cell, start: Array) -> Separated | Undecided:
         """Looks for a plane on the polytope and a cell, and proves it.
@@ -109,21 +131,14 @@ class Bodies:
         Args:
             start: (n,) a point of the polytope in the cell.
         """
-        C, d = cell.inside.C, cell.inside.d
-        X, N = self._configurations(cell, start)
-        for _ in range(ROUNDS):
-            kind, z, places, weights, N = self._look(cell, X, N)
-            if kind != planes.FOUND:
-                break
-            plane = self._in_s(cell, z)
-            result = self._prove(cell, plane)
-            if isinstance(result, tuple):
-                return Separated(plane, result)
-            if isinstance(result, int) or len(X) == N:
-                return Undecided(X[:N].copy(), None, weights, result if isinstance(result, int) else None)
-            X[N] = chords(C, d, start, result[None], 0, 0)[0]
-            N += 1
-        return Undecided(X[:N].copy(), X[places], weights)
+        kind, plane, proofs, first, X, places, weights = _separate(
+            self.pair, cell.lower, cell.upper, *self._inside(cell), start, cell.points, cell.seed, LEAST / self._area.finer
+        )
+        if kind == SEPARATED:
+            return Separated(plane, _streams(proofs, first))
+        if kind == NO_PLANE:
+            return Undecided(X, X[places], weights)
+        return Undecided(X, None, weights, None if kind == UNPROVED else -1 - kind)
 
     def held_by(self, cell: Cell, plane: Array, play: Sequence[int]) -> Separated | None:
         """Returns the proof that a given plane separates the bodies on the polytope and a cell; None where it cannot be proved.
@@ -135,9 +150,13 @@ class Bodies:
         own = [0, *(1 + play.index(joint) for joint in self.joints)]
         if np.delete(plane, own, axis=1).any():
             return None  # It moves with joints that move neither body.
-        plane = self._bounded(cell, plane[:, own])
-        result = self._prove(cell, plane)
-        return Separated(plane, result) if isinstance(result, tuple) else None
+        kind, plane, proofs, first = _held_by(self.pair, cell.lower, cell.upper, *self._inside(cell), np.ascontiguousarray(plane[:, own]))
+        return Separated(plane, _streams(proofs, first)) if kind == PROVED else None
+
+    def _inside(self, cell: Cell) -> tuple[Array, Array, Array, Array, Array]:
+        """Returns the part of the polytope in a cell, with rows of length 1; and the faces that cut the cell, and their numbers."""
+        faces, C, d = cell.inside
+        return C, d, self._area.polytope.C[faces], self._area.polytope.d[faces], faces
 
     def changes(self, cell: Cell, s: Array, joints: Sequence[int]) -> Array:
         """Returns how much the gap changes when one joint moves across the cell, for each of these joints, (k,).
@@ -149,28 +168,6 @@ class Bodies:
         for row, joint in zip(X, joints, strict=True):
             row[0, joint], row[2, joint] = cell.lower[joint], cell.upper[joint]
         found: Array = np.ptp(gaps(*self.hulls, X.reshape(-1, len(s))).reshape(-1, 3), axis=1)
-        return found
-
-    def _configurations(self, cell: Cell, start: Array) -> tuple[Array, int]:
-        """Returns the configurations of the cell to look at first, and how many these are; there is room for MORE."""
-        n, seed = len(start), cell.seed
-        rng = np.random.default_rng(seed)
-        targets = np.where(rng.random((CORNERS if self._corners is None else len(self._corners), n)) < 0.5, cell.lower, cell.upper)
-        if self._corners is not None:
-            targets[:, self.joints] = np.where(self._corners, cell.upper[self.joints], cell.lower[self.joints])
-        ends = chords(cell.inside.C, cell.inside.d, start, targets, CHORDS, seed)
-        N = 1 + len(ends) + len(cell.points)
-        X = np.empty((N + MORE, n))
-        X[0], X[1 : 1 + len(ends)], X[1 + len(ends) : N] = start, ends, cell.points
-        return X, N
-
-    def _look(self, cell: Cell, X: Array, N: int) -> tuple[int, Array, Array, Array, int]:
-        """Looks for a plane on the polytope and a cell (:func:`certifier.partition.planes.look`)."""
-        J = np.array(self.joints)
-        chart = planes.Chart(J, cell.mid[J], CALM / cell.half[J], CALM)
-        found: tuple[int, Array, Array, Array, int] = planes.look(
-            *self.hulls, chart, cell.inside.C, cell.inside.d, X, N, LOOKS, DESCENT, LEAST / self._area.finer, ENOUGH
-        )
         return found
 
     def nearest(self, cell: Cell, configurations: Array) -> tuple[Array, float] | None:
@@ -196,40 +193,172 @@ class Bodies:
         plane[:, [0, *(1 + play.index(joint) for joint in self.joints)]] = found.plane
         return plane, joined([side.renumbered(streams, play) for side, streams in zip(self._sides, found.streams, strict=True)])
 
-    def _prove(self, cell: Cell, plane: Array) -> tuple[Streams, Streams] | Array | int:
-        """Returns the streams of both sides, or what :meth:`certifier.partition.sides.Side.prove` says."""
-        faces = cell.inside.faces
-        C, d = self._area.polytope.C[faces], self._area.polytope.d[faces]
-        found = []
-        for side in self._sides:
-            result = side.prove(plane, cell.lower, cell.upper, C, d, faces, self._pieces)
-            if not isinstance(result, Streams):
-                return result
-            found.append(result)
-        first, second = found
-        return first, second
 
-    def _in_s(self, cell: Cell, z: Array) -> Array:
-        """Returns a plane as a proof holds it, (5, 1 + k), from one in the coordinates of the search."""
-        plane = z.reshape(4, 1 + len(self.joints)).copy()
-        plane[:3] /= self.extent
-        plane[3] -= self._middle @ plane[:3]
-        plane[:, 1:] *= CALM / cell.half[self.joints]
-        plane[:, 0] -= plane[:, 1:] @ cell.mid[self.joints]
-        return self._bounded(cell, plane / np.abs(plane[:3]).max())
+SEPARATED, NO_PLANE, UNPROVED = 2, 1, 0
+"""What :func:`_separate` finds: a plane and its proof, that there is none, or none that is proved. Where a plane took too many pieces,
+-1 - j says in which joint j most of them were halved."""
 
-    def _bounded(self, cell: Cell, plane: Array) -> Array:
-        """Returns a plane (4, 1 + k) with a bound of its normal's length on the cell, larger than that by more than rounding errors."""
-        k, mid, half = len(self.joints), cell.mid[self.joints], cell.half[self.joints]
-        bound = np.zeros(1 + k)
-        if max(self._radii) > 0:
-            at_mid = np.column_stack([plane[:, 0] + plane[:, 1:] @ mid, plane[:, 1:] * half / CALM])
-            planes.length_bound(at_mid.ravel(), k, CALM, bound)
-            bound[0] += SAFE * np.abs(bound).sum()
-            bound[1:] *= CALM / half
-            bound[0] -= bound[1:] @ mid
-        normal = np.abs(np.vstack([plane[:3], bound]))
-        # In a narrow cell, terms that nearly cancel leave a short normal, and the verifier adds up their rounding errors.
-        farthest = np.maximum(np.abs(cell.lower), np.abs(cell.upper))[self.joints]
-        bound[0] += ROUNDING * (normal[:, 0].sum() + (normal[:, 1:] @ farthest).sum())
-        return np.vstack([plane, bound])
+
+def _streams(proofs: Proofs, first: Array) -> tuple[Streams, Streams]:
+    """Returns the streams of the first volume, which have these lengths, and those of the second."""
+    found = []
+    for begin, end in ((np.zeros(3, np.int64), first), (first, proofs.lengths)):
+        a, b, c = (slice(i, j) for i, j in zip(begin.tolist(), end.tolist(), strict=True))
+        found.append(Streams(proofs.pieces[a].copy(), proofs.counts[b].copy(), proofs.faces[c].copy(), proofs.multipliers[c].copy()))
+    return found[0], found[1]
+
+
+@njit(cache=True)
+def _separate(
+    pair: Pair,
+    lower: Array,
+    upper: Array,
+    C: Array,
+    d: Array,
+    cutting: Array,
+    offsets: Array,
+    faces: Array,
+    start: Array,
+    points: Array,
+    seed: int,
+    least: float,
+) -> tuple[int, Array, Proofs, Array, Array, Array, Array]:
+    """Looks for a plane on the polytope and a cell, and proves it.
+
+    Args:
+        C, d: the part of the polytope in the cell, with rows of length 1.
+        cutting, offsets, faces: the polytope's faces that cut the cell, and their numbers.
+        start, points: a point of the polytope in the cell, and others to look at.
+
+    Returns:
+        What is found (SEPARATED and the others), the plane (5, 1 + k) as a proof holds it, the proofs of both sides, the lengths of the
+        first one's, the configurations that were looked at, and which of these no plane separates, with weights.
+    """
+    J = pair.joints
+    mid, half = (lower + upper) / 2, (upper - lower) / 2
+    X, N = _configurations(J, lower, upper, C, d, start, points, seed)
+    chart = planes.Chart(J, mid[J], CALM / half[J], CALM)
+    plane, first, refuted = np.zeros((5, 1 + len(J))), np.zeros(3, np.int64), np.empty(len(start))
+    proofs = room_for(len(pair.first.vertices) + len(pair.second.vertices), pair.pieces)
+    places, weights = np.zeros(0, np.int64), np.zeros(0)
+    for _ in range(ROUNDS):
+        kind, z, places, weights, N = planes.look(pair.a, pair.b, chart, C, d, X, N, LOOKS, DESCENT, least, ENOUGH)
+        if kind != planes.FOUND:
+            break
+        plane = in_s(pair, lower, upper, z)
+        result = prove_both(pair, plane, lower, upper, cutting, offsets, faces, proofs, first, refuted)
+        if result == PROVED:
+            return SEPARATED, plane, proofs, first, X[:N].copy(), places, weights
+        if result < 0:
+            return result, plane, proofs, first, X[:N].copy(), places, weights
+        if len(X) == N:
+            return UNPROVED, plane, proofs, first, X[:N].copy(), places, weights
+        X[N] = within(C, d, start, refuted)
+        N += 1
+    return NO_PLANE, plane, proofs, first, X[:N].copy(), places, weights
+
+
+@njit(cache=True)
+def _held_by(
+    pair: Pair, lower: Array, upper: Array, C: Array, d: Array, cutting: Array, offsets: Array, faces: Array, plane: Array
+) -> tuple[int, Array, Proofs, Array]:
+    """Proves a plane (4, 1 + k) as a proof holds it on the polytope and a cell. The arguments are those of :func:`_separate`."""
+    first, refuted = np.zeros(3, np.int64), np.empty(len(lower))
+    proofs = room_for(len(pair.first.vertices) + len(pair.second.vertices), pair.pieces)
+    bounded = _bounded(pair, lower, upper, plane)
+    return prove_both(pair, bounded, lower, upper, cutting, offsets, faces, proofs, first, refuted), bounded, proofs, first
+
+
+@njit(cache=True, inline="always")
+def prove_both(
+    pair: Pair,
+    plane: Array,
+    lower: Array,
+    upper: Array,
+    cutting: Array,
+    offsets: Array,
+    faces: Array,
+    proofs: Proofs,
+    first: Array,
+    refuted: Array,
+) -> int:
+    """Proves both sides (:func:`certifier.partition.sides.prove_side`); ``first`` gets the lengths of the streams of the first one."""
+    proofs.lengths[:] = 0
+    result = prove_side(pair.first, plane, lower, upper, cutting, offsets, faces, pair.pieces, proofs, refuted)
+    if result == PROVED:
+        first[:] = proofs.lengths
+        result = prove_side(pair.second, plane, lower, upper, cutting, offsets, faces, pair.pieces, proofs, refuted)
+    return result
+
+
+@njit(cache=True)
+def _configurations(
+    joints: Array, lower: Array, upper: Array, C: Array, d: Array, start: Array, points: Array, seed: int
+) -> tuple[Array, int]:
+    """Returns the configurations of the cell to look at first, and how many these are; there is room for MORE."""
+    n, k = len(start), len(joints)
+    corners = min(1 << k, CORNERS)
+    np.random.seed(seed)
+    targets = np.empty((corners, n))
+    for i in range(corners):
+        for j in range(n):
+            targets[i, j] = lower[j] if np.random.random() < 0.5 else upper[j]
+        if corners == 1 << k:
+            for e in range(k):
+                targets[i, joints[e]] = upper[joints[e]] if (i >> (k - 1 - e)) & 1 else lower[joints[e]]
+    ends = chords(C, d, start, targets, CHORDS, seed)
+    N = 1 + len(ends) + len(points)
+    X = np.empty((N + MORE, n))
+    X[0], X[1 : 1 + len(ends)], X[1 + len(ends) : N] = start, ends, points
+    return X, N
+
+
+@njit(cache=True)
+def in_s(pair: Pair, lower: Array, upper: Array, z: Array) -> Array:
+    """Returns a plane as a proof holds it, (5, 1 + k), from one in the coordinates of the search."""
+    J, k = pair.joints, len(pair.joints)
+    plane = z.reshape(4, 1 + k).copy()
+    largest = 0.0
+    for c in range(3):
+        plane[c] /= pair.extent
+        plane[3] -= pair.middle[c] * plane[c]
+    for c in range(4):
+        for e in range(k):
+            j = J[e]
+            plane[c, 1 + e] *= CALM / ((upper[j] - lower[j]) / 2)
+            plane[c, 0] -= plane[c, 1 + e] * ((lower[j] + upper[j]) / 2)
+    for c in range(3):
+        for e in range(1 + k):
+            largest = max(largest, abs(plane[c, e]))
+    return _bounded(pair, lower, upper, plane / largest)
+
+
+@njit(cache=True)
+def _bounded(pair: Pair, lower: Array, upper: Array, plane: Array) -> Array:
+    """Returns a plane (4, 1 + k) with a bound of its normal's length on the cell, larger than that by more than rounding errors."""
+    J, k = pair.joints, len(pair.joints)
+    bound = np.zeros(1 + k)
+    if pair.rounded:
+        at_mid = plane.copy()
+        for c in range(4):
+            for e in range(k):
+                j = J[e]
+                at_mid[c, 0] += plane[c, 1 + e] * ((lower[j] + upper[j]) / 2)
+                at_mid[c, 1 + e] *= (upper[j] - lower[j]) / 2 / CALM
+        planes.length_bound(at_mid.ravel(), k, CALM, bound)
+        bound[0] += SAFE * np.abs(bound).sum()
+        for e in range(k):
+            j = J[e]
+            bound[1 + e] *= CALM / ((upper[j] - lower[j]) / 2)
+            bound[0] -= bound[1 + e] * ((lower[j] + upper[j]) / 2)
+    # In a narrow cell, terms that nearly cancel leave a short normal, and the verifier adds up their rounding errors.
+    rounding = abs(bound[0])
+    for c in range(3):
+        rounding += abs(plane[c, 0])
+    for e in range(k):
+        farthest = max(abs(lower[J[e]]), abs(upper[J[e]]))
+        rounding += (abs(plane[0, 1 + e]) + abs(plane[1, 1 + e]) + abs(plane[2, 1 + e]) + abs(bound[1 + e])) * farthest
+    bound[0] += ROUNDING * rounding
+    found = np.empty((5, 1 + k))
+    found[:4], found[4] = plane, bound
+    return found

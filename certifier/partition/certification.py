@@ -40,8 +40,8 @@ from certifier.partition.tree import Node, OpenCell, to_streams
 from certifier.polytopes.proved import ProvedBox
 from certifier.polytopes.simplex import deepest
 from certifier.proof.negative import WitnessProof
-from certifier.proof.outline import OPEN, Outline, Silhouette, Tree
-from certifier.proof.partition import STREAMS, Coarse, PartitionProof, choices_of
+from certifier.proof.outline import Outline, Silhouette, Tree
+from certifier.proof.partition import OPEN, STREAMS, Coarse, PartitionProof, choices_of
 from certifier.verify.pair import check_ground, check_interior
 from certifier.verify.separations import gap_of_share
 from certifier.verify.witness import check_witness

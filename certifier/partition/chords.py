@@ -56,3 +56,17 @@ def chords(C: Array, d: Array, start: Array, targets: Array, steps: int, seed: i
         found[count + 2 * r + 1] = x + high * way
         x = x + (low + (high - low) * np.random.random()) * way
     return found
+
+
+@njit(cache=True)
+def within(C: Array, d: Array, start: Array, target: Array) -> Array:
+    """Returns the point where the way from ``start``, which must be inside, to a target leaves {C x <= d}, or the target."""
+    reach = 1.0
+    for j in range(len(d)):
+        rate, slack = 0.0, d[j]
+        for i in range(len(start)):
+            rate += C[j, i] * (target[i] - start[i])
+            slack -= C[j, i] * start[i]
+        if rate > 1e-14:
+            reach = min(reach, max(slack, 0.0) / rate)
+    return start + INSIDE * reach * (target - start)

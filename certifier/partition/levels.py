@@ -49,7 +49,7 @@ class Levels(NamedTuple):
     two_chains: bool
 
 
-def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> Levels:
+def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume], apart: tuple[float, float] = APART) -> Levels:
     """Returns the levels of two volumes: of fewer than LONG joints, that of the volumes themselves alone.
 
     Of two chains, there is one for every number of joints with which balls are apart at most configurations. So slim levels are kept
@@ -58,6 +58,7 @@ def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> Levels:
 
     Args:
         frame: any body; distances are computed in its frame.
+        apart: as APART.
     """
     kinematics, (a, b) = area.kinematics, volumes
     if len(kinematics.chain(a.body, b.body)) < LONG:
@@ -78,9 +79,9 @@ def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> Levels:
     fat = itertools.product(*([0, *range(1 + number, len(volumes))] for number, volumes in zip(slender, known, strict=True)))
     candidates = sorted((level for level in fat if 0 < moving(level) < moving(levels[-1])), key=moving)
     fats: list[Level] = []
-    shares = list(range(len(APART)))
+    shares = list(range(len(apart)))
     for _, alternatives in itertools.groupby(candidates, key=moving):
-        room = {level: _room(area, frame, (known[0][level[0]], known[1][level[1]])) for level in alternatives}
+        room = {level: _room(area, frame, (known[0][level[0]], known[1][level[1]]), apart) for level in alternatives}
         best = max(room, key=lambda level: float(room[level][shares[0]]))
         if room[best][shares[0]] > 0:
             fats.append(best)
@@ -91,9 +92,9 @@ def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> Levels:
     return Levels((first, second), levels + fats[::-1], len(levels), two_chains)
 
 
-def _room(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> Array:
-    """Returns how far apart the volumes are at each share in APART of the configurations, in metres; not positive if they touch."""
+def _room(area: Area, frame: str, volumes: tuple[Volume, Volume], apart: tuple[float, float]) -> Array:
+    """Returns how far apart the volumes are at each of these shares of the configurations, in metres; not positive if they touch."""
     padding = area.scene.padding_between(volumes)
     hulls = [hull(area.kinematics, frame, v, v.radius + padding, np.zeros(3), 1.0) for v in volumes]
-    room: Array = np.quantile(gaps(*hulls, area.samples[:LOOKED]), [1 - share for share in APART])
+    room: Array = np.quantile(gaps(*hulls, area.samples[:LOOKED]), [1 - share for share in apart])
     return room

@@ -227,7 +227,10 @@ def descend(
         _slopes(hull, sign, z, bound, chart, s, images, plane, slopes)
         for i in range(n):
             slopes[i] = -slopes[i]
-        if not corner(columns, d, s, slopes, basis, edges, work, way):
+        if len(d) == 2 * n:  # no face cuts the cell
+            for i in range(n):
+                way[i] = (d[i] if slopes[i] > 0 else -d[n + i]) - s[i] if slopes[i] != 0 else 0.0
+        elif not corner(columns, d, s, slopes, basis, edges, work, way):
             break
         _values_on_the_way(hull, images[-1], sign, z, bound, chart, s, way, lanes, values)
         best = values.argmin()

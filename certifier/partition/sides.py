@@ -1,24 +1,67 @@
-"""The polynomials of one volume on one cell in Bernstein form; certifier.verify.partition describes this form, and checks it."""
+"""One volume of a pair on its side of a plane, on one cell: control points (certifier.partition.bernstein), and what they prove.
+
+Between frame F and body B the kinematics have one factor T0 + T1 s + T2 s^2 for each joint. On a cell [l, u], let w, v be cos(q/2) at its
+ends, or 1 for a slide. Then w^2 (T0 + T1 l + T2 l^2), w v (T0 + T1 (l + u)/2 + T2 l u), and v^2 (T0 + T1 u + T2 u^2) are the control
+matrices of a factor. With these weights, equal steps in t are equal angles.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from certifier.model import Array, Volume
 from certifier.partition import bernstein
 from certifier.partition.area import Area
-from certifier.partition.multipliers import REFUTED, UNDECIDED
+from certifier.partition.multipliers import PROVED, REFUTED
 from certifier.partition.positive import DEPTH, Answer, Question, prove
-from certifier.partition.tree import Streams, joined
+from certifier.partition.tree import Streams
 
 PRECISION = 1e-7
 """Control values have to be this much larger than 0, relative to what they are made of. The verifier asks for less."""
-ROOM = 4096
-"""At most this many pieces are stored for a vertex, and ten times as many multipliers."""
+CODES, FACES = 4, 40
+"""There is room for CODES nodes and FACES multipliers for every piece that a vertex may take."""
+
+
+class Moving(NamedTuple):
+    """One volume and how it moves in the frame of the plane.
+
+    Attributes:
+        terms: (F, 3, 4, 4) of the factors of its pose.
+        joints: (F,) their position indices; -1 for a factor that does not move.
+        own: (k,) the same of those that move, ascending; outside: (o,) those of the other joints in play.
+        places: (k + o,) which joint in play each of these is.
+        rest: (r,) the joints that are not in play.
+        vertices: (V, 3) metres, in the body's own frame.
+        sign: 1 for the positive side of the plane, -1 for the other.
+        radius: metres, padding included.
+        revolute: (n,) of all joints.
+    """
+
+    terms: Array
+    joints: Array
+    own: Array
+    outside: Array
+    places: Array
+    rest: Array
+    vertices: Array
+    sign: float
+    radius: float
+    revolute: Array
+
+
+class Proofs(NamedTuple):
+    """Streams of proofs as :class:`certifier.partition.tree.Streams` has them; they are filled up to ``lengths``, (3,)."""
+
+    pieces: Array
+    counts: Array
+    faces: Array
+    multipliers: Array
+    lengths: Array
 
 
 class Side:
@@ -31,41 +74,23 @@ class Side:
     """
 
     def __init__(self, area: Area, frame: str, volume: Volume, joints: list[int], sign: float, radius: float) -> None:
-        self.volume, self.sign, self.radius = volume, sign, radius
-        self._path, self._joints = area.kinematics.path(frame, volume.body), joints
-        self._order = [factor.index for factor in self._path if factor.index is not None]
-        self.own = sorted(self._order)
+        path = area.kinematics.path(frame, volume.body)
+        still = np.array([np.eye(4), np.zeros((4, 4)), np.zeros((4, 4))])
+        order = [-1 if factor.index is None else factor.index for factor in path]
+        self.own = sorted(joint for joint in order if joint >= 0)
         self.outside = [j for j in joints if j not in self.own]
-        self._space = area.scene
-
-    def ends(self, lower: Array, upper: Array) -> Array:
-        """Returns the ends of a cell and the cosines of half the angles there, (4, n): the rows l, u, w and v."""
-        bounds = np.array([lower, upper])
-        return np.concatenate([bounds, self._space.cosine(bounds)])
-
-    def control_matrices(self, ends: Array) -> tuple[Array, Array]:
-        """Returns the control matrices of the volume's pose on a cell with these ends, (3^k, 4, 4), the first own joint slowest.
-
-        The lower right elements of a factor are the denominator in one own joint. They are returned as well, (k, 3).
-        """
-        X, den = np.eye(4)[None], np.ones((len(self.own), 3))
-        for factor in self._path:
-            T = factor.terms
-            if factor.index is None:
-                X = X @ T[0]
-                continue
-            l, u, w, v = ends[:, factor.index]
-            controls = [
-                w * w * (T[0] + l * (T[1] + l * T[2])),
-                w * v * (T[0] + (l + u) / 2 * T[1] + l * u * T[2]),
-                v * v * (T[0] + u * (T[1] + u * T[2])),
-            ]
-            den[self.own.index(factor.index)] = [control[3, 3] for control in controls]
-            X = (X[:, None] @ np.array(controls)).reshape(-1, 4, 4)
-        k = len(self.own)
-        if self._order != self.own:
-            X = X.reshape((3,) * k + (4, 4)).transpose([self._order.index(j) for j in self.own] + [k, k + 1]).reshape(-1, 4, 4)
-        return np.ascontiguousarray(X), den
+        self.moving = Moving(
+            np.array([still, *(factor.terms for factor in path)]),
+            np.array([-1, *order]),
+            np.array(self.own, np.int64),
+            np.array(self.outside, np.int64),
+            np.array([joints.index(joint) for joint in self.own + self.outside], np.int64),
+            np.array([joint for joint in range(area.scene.n) if joint not in joints and joint not in self.own], np.int64),
+            np.array(volume.vertices, dtype=float),
+            sign,
+            radius,
+            area.scene.revolute,
+        )
 
     def renumbered(self, streams: Streams, play: Sequence[int]) -> Streams:
         """Returns streams with the numbers that the axes have where more joints are in play."""
@@ -76,70 +101,187 @@ class Side:
         pieces[halved] = numbers[pieces[halved]]
         return replace(streams, pieces=pieces)
 
-    def prove(self, plane: Array, lower: Array, upper: Array, C: Array, d: Array, faces: Array, most: int) -> Streams | Array | int:
-        """Proves that the volume is on its side of the plane on the polytope and a cell.
 
-        Args:
-            plane: (5, 1 + k), affine in s: the normal, the offset, and a bound of the normal's length.
-            C, d: the polytope's faces that cut the cell; ``faces`` are their numbers.
-            most: at most this many pieces are tried for one vertex.
+@njit(cache=True)
+def ends_of(moving: Moving, lower: Array, upper: Array) -> Array:
+    """Returns the ends of a cell and the cosines of half the angles there, (4, n): the rows l, u, w and v."""
+    ends = np.ones((4, len(lower)))
+    ends[0], ends[1] = lower, upper
+    for i in range(len(lower)):
+        if moving.revolute[i]:
+            ends[2, i], ends[3, i] = 1 / np.sqrt(1 + lower[i] * lower[i]), 1 / np.sqrt(1 + upper[i] * upper[i])
+    return ends
 
-        Returns:
-            The streams of the proof; or a point (n,) of the polytope and the cell where a vertex is not on its side; or the joint along
-            which the pieces were halved most often when they were too many.
-        """
-        mid, half = (lower + upper) / 2, (upper - lower) / 2
-        own, outside = self.own, self.outside
-        rest = [i for i in range(len(mid)) if i not in own and i not in outside]
-        ends = self.ends(lower, upper)
-        X, den = self.control_matrices(ends)
-        plane, bound = self.sign * plane[:4], plane[4]
-        plane[3] -= self.radius * bound
-        slopes = {joint: plane[:, 1 + place] for place, joint in enumerate(self._joints)}
-        ends = np.ascontiguousarray(ends[:, own])
-        c = bernstein.polynomials(
-            X,
-            self.volume.vertices,
-            plane[:, 0] + sum((slopes[j] * mid[j] for j in outside), np.zeros(4)),
-            np.array([slopes[j] for j in own]).reshape(-1, 4),
-            np.array([slopes[j] * half[j] for j in outside]).reshape(-1, 4),
-            ends,
+
+@njit(cache=True)
+def control_matrices(moving: Moving, ends: Array) -> tuple[Array, Array]:
+    """Returns the control matrices of the volume's pose on a cell with these ends, (3^k, 4, 4), the first own joint slowest.
+
+    The lower right elements of a factor are the denominator in one own joint. They are returned as well, (k, 3).
+    """
+    k = len(moving.own)
+    X, Y, den, place = np.zeros((3**k, 4, 4)), np.zeros((3**k, 4, 4)), np.ones((k, 3)), np.zeros(k, np.int64)
+    controls = np.empty((3, 4, 4))
+    for a in range(4):
+        X[0, a, a] = 1.0
+    size, moved = 1, 0
+    for f in range(len(moving.joints)):
+        j, T = moving.joints[f], moving.terms[f]
+        count = 1
+        if j < 0:
+            controls[0] = T[0]
+        else:
+            l, u, w, v = ends[0, j], ends[1, j], ends[2, j], ends[3, j]
+            for a in range(4):
+                for b in range(4):
+                    t0, t1, t2 = T[0, a, b], T[1, a, b], T[2, a, b]
+                    controls[0, a, b] = w * w * (t0 + l * (t1 + l * t2))
+                    controls[1, a, b] = w * v * (t0 + (l + u) / 2 * t1 + l * u * t2)
+                    controls[2, a, b] = v * v * (t0 + u * (t1 + u * t2))
+            count = 3
+            for e in range(k):
+                if moving.own[e] == j:
+                    place[moved] = e
+            for c in range(3):
+                den[place[moved], c] = controls[c, 3, 3]
+            moved += 1
+        for i in range(size):
+            for c in range(count):
+                for a in range(4):
+                    x0, x1, x2, x3 = X[i, a, 0], X[i, a, 1], X[i, a, 2], X[i, a, 3]
+                    for b in range(4):
+                        t = x0 * controls[c, 0, b] + x1 * controls[c, 1, b]
+                        Y[i * count + c, a, b] = t + x2 * controls[c, 2, b] + x3 * controls[c, 3, b]
+        size *= count
+        X, Y = Y, X
+    ordered = True
+    for e in range(k):
+        ordered = ordered and place[e] == e
+    if ordered:
+        return X, den
+    # X is in path order, the first joint of the path slowest.
+    for i in range(size):
+        rest, to = i, 0
+        for e in range(k - 1, -1, -1):
+            to += rest % 3 * 3 ** (k - 1 - place[e])
+            rest //= 3
+        Y[to] = X[i]
+    return Y, den
+
+
+@njit(cache=True)
+def room_for(vertices: int, most: int) -> Proofs:
+    """Returns room for the proofs of this many vertices, each of at most ``most`` pieces."""
+    pieces = vertices * most
+    return Proofs(
+        np.empty(CODES * pieces, np.int8),
+        np.empty(CODES * pieces, np.int16),
+        np.empty(FACES * pieces, np.int16),
+        np.empty(FACES * pieces, np.float32),
+        np.zeros(3, np.int64),
+    )
+
+
+@njit(cache=True)
+def prove_side(
+    moving: Moving,
+    plane: Array,
+    lower: Array,
+    upper: Array,
+    C: Array,
+    d: Array,
+    faces: Array,
+    most: int,
+    proofs: Proofs,
+    point: Array,
+) -> int:
+    """Proves that the volume is on its side of the plane on the polytope and a cell.
+
+    Args:
+        plane: (5, 1 + K), affine in s: the normal, the offset, and a bound of the normal's length.
+        C, d: the polytope's faces that cut the cell; ``faces`` are their numbers.
+        most: at most this many pieces are tried for one vertex.
+        proofs: gets the streams of the proof behind what it holds.
+        point: (n,) gets a point of the polytope and the cell where a vertex is not on its side, where there is one.
+
+    Returns:
+        PROVED, REFUTED, or -1 - j where there were too many pieces; j is the joint along which the pieces were halved most often.
+    """
+    own, outside, rest = moving.own, moving.outside, moving.rest
+    k, o, r, m = len(own), len(outside), len(rest), len(d)
+    mid, half = (lower + upper) / 2, (upper - lower) / 2
+    ends = ends_of(moving, lower, upper)
+    X, den = control_matrices(moving, ends)
+    base, slopes = np.empty(4), np.empty((k + o, 4))
+    for c in range(4):
+        base[c] = moving.sign * plane[c, 0]
+        for e in range(k + o):
+            slopes[e, c] = moving.sign * plane[c, 1 + moving.places[e]]
+    base[3] -= moving.radius * plane[4, 0]
+    for e in range(k + o):
+        slopes[e, 3] -= moving.radius * plane[4, 1 + moving.places[e]]
+    own_ends, halves = np.empty((4, k)), np.empty((o, 4))
+    for e in range(k):
+        own_ends[:, e] = ends[:, own[e]]
+    for e in range(o):
+        base += slopes[k + e] * mid[outside[e]]
+        halves[e] = slopes[k + e] * half[outside[e]]
+    c = bernstein.polynomials(X, moving.vertices, base, slopes[:k], halves, own_ends)
+    factors = bernstein.factors(den, own_ends)
+    constant, by_own, by_outside, by_rest = d.copy(), np.empty((k, m)), np.empty((o, m)), np.empty((r, m))
+    for j in range(m):
+        for e in range(k):
+            by_own[e, j] = -C[j, own[e]]
+        for e in range(o):
+            by_outside[e, j] = -C[j, outside[e]] * half[outside[e]]
+            constant[j] -= C[j, outside[e]] * mid[outside[e]]
+        for e in range(r):
+            by_rest[e, j] = -C[j, rest[e]] * half[rest[e]]
+            constant[j] -= C[j, rest[e]] * mid[rest[e]]
+    V = len(moving.vertices)
+    stack, spot = np.empty((DEPTH, 1 + o, 4**k)), np.zeros(k + o + r)
+    found, where = room_for(V, most), np.zeros((V + 1, 3), np.int64)
+    order, halvings = np.argsort(bernstein.leasts(c)), np.zeros(k + o, np.int64)
+    ends_at = np.zeros((V, 3), np.int64)
+    for vertex in order:
+        a, b, e = found.lengths
+        where[vertex] = found.lengths
+        lengths = np.zeros(3, np.int64)
+        halvings[:] = 0
+        answer = Answer(
+            found.pieces[a : a + CODES * most],
+            found.counts[b : b + CODES * most],
+            found.faces[e : e + FACES * most],
+            found.multipliers[e : e + FACES * most],
+            lengths,
+            spot,
+            halvings,
         )
-        factors = bernstein.factors(den, ends)
-        offset = d - C[:, outside] @ mid[outside] - C[:, rest] @ mid[rest]
-        g = (
-            np.ascontiguousarray(offset),
-            np.ascontiguousarray(-C[:, own].T),
-            np.ascontiguousarray((-C[:, outside] * half[outside]).T),
-            np.ascontiguousarray((-C[:, rest] * half[rest]).T),
-        )
-        found: dict[int, Streams] = {}
-        for vertex in np.argsort(bernstein.leasts(c)):
-            codes, counts, numbers, values = _room()
-            lengths, point, halvings = np.zeros(3, np.int64), np.zeros(len(mid)), np.zeros(len(own) + len(outside), np.int64)
-            answer = Answer(codes, counts, numbers, values, lengths, point, halvings)
-            status = prove(Question(c[vertex], factors, ends, *g), PRECISION, most, answer, _stack(len(outside), len(own)))
-            if status == REFUTED:
-                s = mid.copy()
-                place = len(own) + len(outside)
-                s[own] = point[: len(own)]
-                s[outside] = mid[outside] + half[outside] * point[len(own) : place]
-                s[rest] = mid[rest] + half[rest] * point[place:]
-                return s
-            if status == UNDECIDED:
-                return int([*own, *outside][int(halvings.argmax())])
-            a, b, e = lengths
-            found[int(vertex)] = Streams(codes[:a].copy(), counts[:b].copy(), faces[numbers[:e]].astype(np.int16), values[:e].copy())
-        return joined([found[vertex] for vertex in range(len(c))])
-
-
-@lru_cache(maxsize=8)
-def _stack(outside: int, own: int) -> Array:
-    """Returns memory to work in, which all sides share, because a process may have hundreds of them."""
-    return np.empty((DEPTH, 1 + outside, 4**own))
-
-
-@lru_cache(maxsize=1)
-def _room() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Returns room for the codes, counts, faces and multipliers of one vertex, which all sides share."""
-    return np.empty(ROOM, np.int8), np.empty(ROOM, np.int16), np.empty(10 * ROOM, np.int16), np.empty(10 * ROOM, np.float32)
+        status = prove(Question(c[vertex], factors, own_ends, constant, by_own, by_outside, by_rest), PRECISION, most, answer, stack)
+        if status == REFUTED:
+            point[:] = mid
+            for i in range(k):
+                point[own[i]] = spot[i]
+            for i in range(o):
+                point[outside[i]] = mid[outside[i]] + half[outside[i]] * spot[k + i]
+            for i in range(r):
+                point[rest[i]] = mid[rest[i]] + half[rest[i]] * spot[k + o + i]
+            return REFUTED
+        if status != PROVED:
+            most_halved = halvings.argmax()
+            return -1 - (own[most_halved] if most_halved < k else outside[most_halved - k])
+        for i in range(3):
+            found.lengths[i] += lengths[i]
+        ends_at[vertex] = found.lengths
+    for vertex in range(V):
+        a, b, e = proofs.lengths
+        first, last = where[vertex], ends_at[vertex]
+        lengths = last - first
+        proofs.pieces[a : a + lengths[0]] = found.pieces[first[0] : last[0]]
+        proofs.counts[b : b + lengths[1]] = found.counts[first[1] : last[1]]
+        for i in range(lengths[2]):
+            proofs.faces[e + i] = faces[found.faces[first[2] + i]]
+            proofs.multipliers[e + i] = found.multipliers[first[2] + i]
+        for i in range(3):
+            proofs.lengths[i] += lengths[i]
+    return PROVED

@@ -14,8 +14,7 @@ import numpy as np
 
 from certifier.partition.tree import Node, OpenCell, of_streams
 from certifier.proof.container import FORMAT, pack, unpack
-from certifier.proof.outline import OPEN
-from certifier.proof.partition import STREAMS
+from certifier.proof.partition import OPEN, STREAMS
 
 KIND = "subtrees"
 _OF_OPEN_CELLS = ("lower", "upper", "levels")

@@ -120,10 +120,10 @@ def _joined(
     if same_padding and len(known) == len(asked) and _will_do(scene, first, second, samples, keep):
         return [known]
     larger, other = (first, second) if len(first) >= len(second) else (second, first)
-    return [members for half in _halves(larger) for members in _joined(scene, half, other, numbers, samples, keep)]
+    return [members for half in halves(larger) for members in _joined(scene, half, other, numbers, samples, keep)]
 
 
-def _halves(geometries: list[Geometry]) -> tuple[list[Geometry], list[Geometry]]:
+def halves(geometries: list[Geometry]) -> tuple[list[Geometry], list[Geometry]]:
     """Returns the lower and the upper half of geometries along the axis in which their centres lie farthest apart."""
     centers = np.array([geometry.vertices.mean(axis=0) for geometry in geometries])
     order = np.argsort(centers[:, np.argmax(np.ptp(centers, axis=0))], kind="stable")

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from certifier.model import Array
-from certifier.proof.outline import OPEN
-from certifier.proof.partition import EMPTY, PLANE, STREAMS
+from certifier.proof.partition import EMPTY, OPEN, PLANE, STREAMS
 
 ALL = 127
 """Sentinel: more levels than there are."""

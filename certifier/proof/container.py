@@ -274,5 +274,5 @@ def head(header: dict[str, Any], *names: str) -> dict[str, Node]:
     Raises:
         CirisError: the header lacks one of them, or has others.
     """
-    scene, more = ("scene", ()) if header["kind"] == "region" else ("scene_hash", ("scene",))
+    scene, more = ("scene", ()) if header["kind"] in ("region", "map") else ("scene_hash", ("scene",))
     return Node(header, "header").fields("format", "kind", scene, *names, optional=more)

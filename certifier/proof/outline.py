@@ -15,12 +15,10 @@ import numpy as np
 
 from certifier.model import Array, Scene, Volume
 from certifier.proof.container import FORMAT, pack, some_of, unpack
-from certifier.proof.partition import EMPTY, PLANE, PartitionProof
+from certifier.proof.partition import EMPTY, OPEN, PLANE, PartitionProof
 from certifier.proof.separation import DEFAULT_FORM
 
 KIND = "outline"
-OPEN = -3
-"""The cell of this node is open: nothing is proved about it. The verifier accepts no such tree."""
 FOLDED = -4
 """The cell of this node is divided further, which this outline does not show."""
 

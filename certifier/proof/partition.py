@@ -37,6 +37,8 @@ PLANE = -1
 """This node of the tree of cuts is a leaf with a plane; this node of a tree of pieces is a piece with z0 = 1."""
 EMPTY = -2
 """The cell of this node, or its piece (z0 = 0), misses the polytope."""
+OPEN = -3
+"""The cell of this node is open: nothing is proved about it. Outlines and maps have such nodes."""
 
 STREAMS = {
     "nodes": "int8",
@@ -81,6 +83,7 @@ class PartitionProof(Separation):
     """
 
     KIND: ClassVar[str] = "partition"
+    LEAVES: ClassVar[tuple[int, ...]] = (PLANE, EMPTY)
     HEADER: ClassVar[tuple[str, ...]] = ("coarse",)
 
     coarse: Coarse

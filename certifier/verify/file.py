@@ -24,6 +24,7 @@ from certifier.proof.region import RegionProof
 from certifier.proof.separation import Separation
 from certifier.verify.decimals import exactly, rounded_down, rounded_up
 from certifier.verify.dual import verify_dual
+from certifier.verify.map import verify_map
 from certifier.verify.motion import verify_motion
 from certifier.verify.paddings import paddings
 from certifier.verify.pair import PairStatement, verify_pair
@@ -40,7 +41,7 @@ class FileStatement:
     """States what a valid file proves.
 
     Attributes:
-        kind: ``region``, ``pair``, ``partition``, ``motion``, ``dual`` or ``witness``.
+        kind: ``region``, ``map``, ``pair``, ``partition``, ``motion``, ``dual`` or ``witness``.
         lines: the statement in plain words, the guarantee last. It follows from the proof and from what the scene's hash covers.
     """
 
@@ -65,6 +66,9 @@ def verify_file(data: bytes, processes: int = 1, progress: Progress | None = Non
     if kind == "region":
         statement = verify_region(data, processes, progress)
         return FileStatement(kind, statement.scene, tuple(statement.lines()), Guarantee.EXACT)
+    if kind == "map":
+        mapped = verify_map(data, processes, progress)
+        return FileStatement(kind, mapped.scene, tuple(mapped.lines()), Guarantee.EXACT)
     if kind not in _READERS:
         raise ProofError("proof_malformed", f"the file is a proof of kind {kind[:40]!r}, which is none", field="header.kind")
     if "scene" not in header:

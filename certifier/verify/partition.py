@@ -63,8 +63,11 @@ class PartitionCheck:
         self._lower = np.nextafter(ground.mid - ground.half, np.inf)
         self._upper = np.nextafter(ground.mid + ground.half, -np.inf)
 
-    def prepared(self, proof: PartitionProof) -> CellCheck:
+    def prepared(self, proof: PartitionProof, roots: Sequence[tuple[Array, Array]] | None = None) -> CellCheck:
         """Checks what a proof says before its first cell, and returns what checks its cells.
+
+        Args:
+            roots: the cells that the proof has a tree for each, as bounds of all joints, (n,) each; None for the box of the ground.
 
         Raises:
             ProofError: the proof makes no sense on the ground.
@@ -87,7 +90,8 @@ class PartitionCheck:
                 if id(other) not in self._coarse:
                     check_coarse(scene, kinematics, other)
                     self._coarse[id(other)] = other
-        return CellCheck(scene, self._ground, Box.of(self._lower, self._upper), self._lower, self._upper, proof)
+        roots = [(self._lower, self._upper)] if roots is None else roots
+        return CellCheck(scene, self._ground, Box.of(self._lower, self._upper), self._lower, self._upper, proof, roots)
 
 
 class CellCheck:
@@ -97,7 +101,16 @@ class CellCheck:
         ProofError: the streams of the proof make no sense, or are too large.
     """
 
-    def __init__(self, scene: Scene, ground: Ground, box: Box, lower: Array, upper: Array, proof: PartitionProof) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        ground: Ground,
+        box: Box,
+        lower: Array,
+        upper: Array,
+        proof: PartitionProof,
+        roots: Sequence[tuple[Array, Array]],
+    ) -> None:
         kinematics = ExactKinematics.by_joint(scene)
         chains = [kinematics.positions(proof.frame, volume.body) for volume in proof.all_volumes]
         self._play = sorted(set().union(*chains))
@@ -105,7 +118,8 @@ class CellCheck:
             most = f"{limits.CHAIN} between the frame and a body, {limits.PLAY} in all"
             raise ProofError("proof_too_large", f"{proof.title}: {list(map(len, chains))} joints in play; at most {most} are checked")
         self._proof, self._box, self._lower, self._upper = proof, box, lower, upper
-        self._cuts = Cuts(proof, self._play)
+        self._cuts = Cuts(proof, self._play, len(roots))
+        self._roots = [(lower[self._play], upper[self._play]) for lower, upper in roots]
         self._pieces = Pieces(proof, len(self._play))
         self._multipliers = Multipliers(proof, ground)
 
@@ -125,12 +139,12 @@ class CellCheck:
         self._rounded = {choice: padding > 0 or first.radius > 0 or second.radius > 0 for choice, (first, second) in used.items()}
 
     def cells(self, most: int) -> Iterator[Cells]:
-        """Yields all cells, at most ``most`` at a time, which :meth:`gap` checks.
+        """Yields all cells but those that are open, at most ``most`` at a time, which :meth:`gap` checks.
 
         Raises:
             ProofError: the cuts do not divide the box.
         """
-        return self._cuts.cells(self._lower[self._play], self._upper[self._play], most)
+        return self._cuts.cells(self._roots, most)
 
     def gap(self, cells: Cells) -> float:
         """Checks some cells and returns a lower bound in metres of the bodies' distance in them; infinity where they all miss the polytope.

@@ -19,6 +19,7 @@ import numpy as np
 from certifier.errors import ProofError
 from certifier.model import Scene, Volume
 from certifier.orphans import die_with_parent
+from certifier.proof.map import PairMap
 from certifier.proof.pair import PairProof
 from certifier.proof.partition import PartitionProof
 from certifier.proof.separation import Separation
@@ -44,17 +45,20 @@ class Part(NamedTuple):
     cells: Cells | None
 
 
-def statements(scene: Scene, proofs: Sequence[Separation], processes: int = 1, progress: Progress | None = None) -> list[PairStatement]:
+def statements(
+    scene: Scene | None, proofs: Sequence[Separation], processes: int = 1, progress: Progress | None = None
+) -> list[PairStatement]:
     """Checks proofs and returns what each of them proves.
 
     Args:
-        scene: which certifier.verify.scene.check_scene has accepted.
+        scene: what all proofs have to be about; None where each is about its own scene. certifier.verify.scene.check_scene has accepted it.
         proofs: on grounds that certifier.verify.pair.check_ground has accepted.
 
     Raises:
         ProofError: one of the proofs does not hold; the first one, in their order.
     """
-    check_contained(scene, {id(volume): volume for proof in proofs for volume in proof.all_volumes}.values())
+    if scene is not None:
+        check_contained(scene, {id(volume): volume for proof in proofs for volume in proof.all_volumes}.values())
     check = _Check(scene, proofs)
     gaps = [np.inf] * len(proofs)
     sizes = [int(np.count_nonzero(proof.nodes < 0)) if isinstance(proof, PartitionProof) else 1 for proof in proofs]
@@ -99,7 +103,7 @@ def verify_separation(proof: Separation, processes: int = 1, progress: Progress 
 class _Check:
     """Checks parts, and keeps what the next one needs."""
 
-    def __init__(self, scene: Scene, proofs: Sequence[Separation]) -> None:
+    def __init__(self, scene: Scene | None, proofs: Sequence[Separation]) -> None:
         self._scene, self._proofs = scene, proofs
         self._contained: dict[int, Volume] = {}
         self._coarse: dict[int, Volume] = {}
@@ -133,7 +137,7 @@ class _Check:
             raise ProofError("proof_malformed", f"{proof.title}: a proof of kind {proof.KIND} cannot be checked")
         ground = proof.ground
         if id(ground) not in self._pair_checks:
-            self._pair_checks[id(ground)] = PairCheck(self._scene, ground, self._contained, self._numerators)
+            self._pair_checks[id(ground)] = PairCheck(self._scene or proof.scene, ground, self._contained, self._numerators)
         return self._pair_checks[id(ground)].verify(proof).gap
 
     def statement(self, proof: Separation, gap: float) -> PairStatement:
@@ -142,13 +146,14 @@ class _Check:
         Raises:
             ProofError: the proof says that its polytope is empty.
         """
-        if not np.isfinite(gap):
+        if not np.isfinite(gap) and not isinstance(proof, PairMap):
             raise ProofError("proof_interior", f"{proof.title}: the proof says that the polytope is empty")
         return PairStatement(proof.pairs, gap)
 
     def _cell_check(self, number: int, proof: PartitionProof) -> CellCheck:
         if self._latest is None or self._latest[0] != number:
-            self._latest = number, PartitionCheck(self._scene, proof.ground, self._contained, self._coarse).prepared(proof)
+            check = PartitionCheck(self._scene or proof.scene, proof.ground, self._contained, self._coarse)
+            self._latest = number, check.prepared(proof)
         return self._latest[1]
 
 

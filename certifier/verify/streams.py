@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from certifier.errors import ProofError
 from certifier.model import Array
 from certifier.proof import limits
 from certifier.proof.ground import Ground
-from certifier.proof.partition import EMPTY, PLANE, STREAMS, PartitionProof
+from certifier.proof.partition import EMPTY, OPEN, PLANE, STREAMS, PartitionProof
 
 _MULTIPLIED = 1 << 16
 """About this many multipliers are added up at once."""
@@ -29,7 +29,7 @@ class Cells:
     Attributes:
         number: (B,) of each leaf among all leaves, in the order of the nodes.
         plane: (B,) number of its plane, or of the planes before it where it has none.
-        empty: (B,) whether it has none.
+        empty: (B,) whether it misses the polytope.
         lower: (B, k) least values of the joints in play.
         upper: (B, k) largest values of the joints in play.
     """
@@ -46,12 +46,13 @@ class Cuts:
 
     Args:
         play: position indices of the joints in play, ascending.
+        trees: how many trees the nodes are, one after the other; the proof itself is one.
 
     Raises:
-        ProofError: the streams make no tree, or one that is too large.
+        ProofError: the streams make no trees, or some that are too large.
     """
 
-    def __init__(self, proof: PartitionProof, play: list[int]) -> None:
+    def __init__(self, proof: PartitionProof, play: list[int], trees: int = 1) -> None:
         for name, kind in STREAMS.items():
             array = getattr(proof, name)
             if array.dtype != kind or array.ndim != (3 if name == "planes" else 1):
@@ -59,9 +60,10 @@ class Cuts:
         nodes = proof.nodes
         if len(nodes) > limits.NODES:
             raise ProofError("proof_too_large", f"{proof.title}: {len(nodes)} nodes; at most {limits.NODES} are checked")
-        if not np.isin(nodes, [EMPTY, PLANE, *play]).all():
+        if not np.isin(nodes, [*proof.LEAVES, *play]).all():
             raise malformed(proof, "a node cuts a joint that does not move one of the bodies in the frame, or is of no kind")
-        if _ends(nodes).tolist() != [len(nodes)]:
+        ends = _ends(nodes)
+        if len(ends) != trees or ends[-1] != len(nodes):
             raise malformed(proof, "the tree of cuts ends before or after its last node")
         if len(proof.cuts) != np.count_nonzero(nodes >= 0):
             raise malformed(proof, f"there are {len(proof.cuts)} cuts for {np.count_nonzero(nodes >= 0)} nodes that cut")
@@ -71,18 +73,17 @@ class Cuts:
             raise malformed(proof, "a cut or a plane is not finite")
         self._proof, self._play = proof, play
 
-    def cells(self, lower: Array, upper: Array, most: int) -> Iterator[Cells]:
-        """Yields all leaves, at most ``most`` together.
+    def cells(self, roots: Sequence[tuple[Array, Array]], most: int) -> Iterator[Cells]:
+        """Yields all leaves but those that are open, at most ``most`` together.
 
         Args:
-            lower: (k,) least values of the joints in play in the root's cell.
-            upper: (k,) largest values of them.
+            roots: the least and the largest values of the joints in play, (k,) each, in the cell of every tree.
 
         Raises:
             ProofError: a cut is not inside the cell that it divides, or the tree is too deep.
         """
         proof, column = self._proof, {joint: i for i, joint in enumerate(self._play)}
-        cuts, planes, pending = iter(proof.cuts.tolist()), 0, [(0, lower, upper)]
+        cuts, planes, pending = iter(proof.cuts.tolist()), 0, [(0, *root) for root in reversed(roots)]
         found: list[tuple[int, int, bool, Array, Array]] = []
         number = 0
         for node in proof.nodes.tobytes():
@@ -98,7 +99,8 @@ class Cuts:
                 pending += [(depth + 1, middle_lower, upper), (depth + 1, lower, middle_upper)]
                 continue
             has_plane = node == PLANE + 256
-            found.append((number, planes, not has_plane, lower, upper))
+            if node != OPEN + 256:
+                found.append((number, planes, not has_plane, lower, upper))
             planes += has_plane
             number += 1
             if len(found) == most:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from client.arguments.common import OF_ONE, SCENE, add_proving, as_json, group, remote
-from client.options import CERTIFY, COVER, GROW, JOINTS, RECERTIFY, SEED, about, add_options
+from client.options import CERTIFY, COVER, GROW, JOINTS, MAP, RECERTIFY, SEED, about, add_options
 
 PROOF = "new file for the proof; default: one in this directory, named after scene and proof"
 
@@ -53,6 +53,19 @@ def add(verbs: Any) -> None:
     cover.add_argument("scene", metavar="SCENE", help=SCENE)
     add_options(cover, COVER)
     cover.set_defaults(run="client.cover:cover")
+
+    mapped = verbs.add_parser(
+        "map",
+        parents=[as_json()],
+        help="prove as much as possible of the free configurations, cell by cell",
+        epilog="Example: ciris map examples/iiwa_shelf/scene.yaml --local --coverage 0.8 --deadline 60. "
+        "The exit status is 0 if the coverage is reached.",
+    )
+    mapped.add_argument("scene", metavar="SCENE", help="path of a scene file")
+    add_options(mapped, MAP)
+    mapped.add_argument("--out", metavar="FILE", help="new file for the map; default: one in this directory, named after scene and map")
+    mapped.add_argument("--local", action="store_true", help="grow the map in this process, without a service")
+    mapped.set_defaults(run="client.map:grow")
 
     certify = verbs.add_parser("certify", parents=[remote(), as_json()], help="certify a given polytope: one outcome for each pair")
     certify.add_argument("scene", metavar="SCENE", help=SCENE)

@@ -17,8 +17,8 @@ from certifier.outcome import Outcome, Stage
 from certifier.pair.result import PairResult
 from certifier.partition.certification import CellCertification
 from certifier.polytopes.proved import ProvedBox
-from certifier.proof.outline import OPEN, Outline, Silhouette, Tree
-from certifier.proof.partition import EMPTY, PLANE
+from certifier.proof.outline import Outline, Silhouette, Tree
+from certifier.proof.partition import EMPTY, OPEN, PLANE
 from db import jobs, pairs, proofs, regions, scenes, steps, subtrees
 from db.leases import this_worker
 from db.models import JobRow, SubtreesRow

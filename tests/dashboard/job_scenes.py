@@ -11,8 +11,8 @@ from sqlalchemy import insert
 from certifier.model import Scene
 from certifier.outcome import Outcome, Stage
 from certifier.pair.result import PairResult
-from certifier.proof.outline import OPEN, Outline, Silhouette, Tree
-from certifier.proof.partition import EMPTY, PLANE
+from certifier.proof.outline import Outline, Silhouette, Tree
+from certifier.proof.partition import EMPTY, OPEN, PLANE
 from db import jobs, pairs, scenes
 from db.models import IterationRow, PairRow
 from db.session import Database

@@ -17,7 +17,7 @@ from certifier.partition.hulls import gaps
 from certifier.partition.search import NARROW_APART, NARROW_COARSE, NARROW_CUT, Search
 from certifier.partition.together import volumes_of
 from certifier.partition.tree import Node, OpenCell
-from certifier.proof.outline import OPEN
+from certifier.proof.partition import OPEN
 from tests.certifier.scenes import box, cube, planar_arm
 from tests.certifier.truth import distances_at
 

@@ -16,7 +16,7 @@ from certifier.model import Volume
 from certifier.outcome import Outcome
 from certifier.partition import search
 from certifier.partition.area import Area
-from certifier.partition.bodies import Bodies, Undecided
+from certifier.partition.bodies import Bodies, Undecided, in_s
 from certifier.partition.cell import Cell
 from certifier.partition.certification import CellCertification, CutOff
 from certifier.partition.frames import choose_frame
@@ -153,7 +153,8 @@ def test_the_bound_of_a_normals_length_holds_for_the_verifier_in_a_sliver_too(wi
     given = Facing(width)
     rng, k = np.random.default_rng(0), len(given.bodies.joints)
     for _ in range(50):
-        plane = given.bodies._in_s(given.cell, rng.normal(size=4 * (1 + k)) * 10.0 ** rng.uniform(-6, 0, size=4 * (1 + k)))
+        z = rng.normal(size=4 * (1 + k)) * 10.0 ** rng.uniform(-6, 0, size=4 * (1 + k))
+        plane = in_s(given.bodies.pair, given.cell.lower, given.cell.upper, z)
         bounds = given.cell.lower[given.bodies.joints], given.cell.upper[given.bodies.joints]
         _, room = _norms(plane[None], bounds[0][None], bounds[1][None])
         assert room[0] >= 0
@@ -330,4 +331,4 @@ def test_cells_of_two_chains_are_cut_for_coarse_volumes_however_narrow_they_are(
         result = CellCertification(scene, polytope).certify(index, CELLS)
         found.append((result.outcome, result.open_cells))
     assert found[0] == found[1]
-    assert found[0][0] is Outcome.INCONCLUSIVE, "cells were cut"
+    assert found[0][1] > 1, "cells were cut"

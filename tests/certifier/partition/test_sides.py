@@ -11,8 +11,8 @@ import pytest
 from certifier.kinematics import Kinematics
 from certifier.model import Polytope, Volume
 from certifier.partition.area import Area
-from certifier.partition.sides import Side
-from certifier.partition.tree import Streams
+from certifier.partition.multipliers import PROVED, REFUTED
+from certifier.partition.sides import Side, control_matrices, ends_of, prove_side, room_for
 from certifier.polytopes.polytope import chebyshev_center
 from certifier.polytopes.sampling import hit_and_run
 from tests.certifier.scenes import cube, random_tree
@@ -35,7 +35,7 @@ def test_control_matrices_are_the_pose_on_the_cell(seed):
     assert side.own == sorted(kinematics.chain(frame, body))
     lower = rng.uniform(-1.0, 0.0, scene.n)
     upper = lower + rng.uniform(0.1, 1.0, scene.n)
-    (X, den), points = side.control_matrices(side.ends(lower, upper)), rng.normal(size=(4, 3))
+    (X, den), points = control_matrices(side.moving, ends_of(side.moving, lower, upper)), rng.normal(size=(4, 3))
     assert X[:, 3, 3] == pytest.approx(reduce(np.multiply.outer, den, np.ones(())).ravel() * X[0, 3, 3] / den[:, 0].prod())
     for _ in range(10):
         s, basis = rng.uniform(lower, upper), np.ones(1)
@@ -92,26 +92,29 @@ class Problem:
         cell = Polytope(*rows)
         return hit_and_run(cell, chebyshev_center(cell)[0], count, 1)
 
-    def result(self, most):
-        C, d = self.polytope.C, self.polytope.d
-        return self.side.prove(self.plane, self.lower, self.upper, C, d, np.arange(len(d)), most)
+    def result(self, most, faces=slice(None)):
+        """What becomes of the proof, the point where it is refuted, and the multipliers."""
+        C, d = self.polytope.C[faces], self.polytope.d[faces]
+        proofs, point = room_for(len(self.vertices), most), np.zeros(len(self.lower))
+        kind = prove_side(self.side.moving, self.plane, self.lower, self.upper, C, d, np.arange(len(d)), most, proofs, point)
+        return kind, point, proofs.multipliers[: proofs.lengths[2]]
 
 
 def test_what_is_proved_holds_at_samples_and_what_is_refuted_does_not_hold_at_the_point():
     proved = refuted = 0
     for seed in range(40):
         problem = Problem(seed)
-        result, samples = problem.result(200), problem.samples(1000)
-        if isinstance(result, Streams):
+        (kind, point, multipliers), samples = problem.result(200), problem.samples(1000)
+        if kind == PROVED:
             proved += 1
             assert (problem.sides(samples) > 0).all()
-            assert (result.multipliers > 0).all()
-        elif isinstance(result, np.ndarray):
+            assert (multipliers > 0).all()
+        elif kind == REFUTED:
             refuted += 1
-            assert problem.within(result[None]).all()
-            assert problem.sides(result[None]).min() < 0
+            assert problem.within(point[None]).all()
+            assert problem.sides(point[None]).min() < 0
         else:
-            assert result in problem.joints
+            assert -1 - kind in problem.joints
     assert proved >= 10
     assert refuted >= 10
     assert proved + refuted >= 37
@@ -122,18 +125,15 @@ def test_faces_of_the_polytope_are_what_proves_where_the_cell_alone_is_too_large
     needed = 0
     for seed in range(40):
         problem = Problem(seed)
-        result = problem.result(200)
-        if isinstance(result, Streams) and len(result.faces):
-            alone = problem.side.prove(
-                problem.plane, problem.lower, problem.upper, np.zeros((0, len(problem.lower))), np.zeros(0), np.zeros(0, np.int64), 200
-            )
-            needed += not isinstance(alone, Streams)
+        kind, _, multipliers = problem.result(200)
+        if kind == PROVED and len(multipliers):
+            needed += problem.result(200, faces=slice(0))[0] != PROVED
     assert needed >= 3
 
 
 @pytest.mark.slow
 def test_with_too_few_pieces_the_answer_is_a_joint():
-    few = [Problem(seed).result(1) for seed in range(40)]
-    many = [Problem(seed).result(200) for seed in range(40)]
-    assert sum(isinstance(result, int) for result in few) > sum(isinstance(result, int) for result in many)
-    assert not any(isinstance(a, Streams) and isinstance(b, np.ndarray) for a, b in zip(few, many, strict=True))
+    few = [Problem(seed).result(1)[0] for seed in range(40)]
+    many = [Problem(seed).result(200)[0] for seed in range(40)]
+    assert sum(kind < 0 for kind in few) > sum(kind < 0 for kind in many)
+    assert not any(a == PROVED and b == REFUTED for a, b in zip(few, many, strict=True))

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 
 from certifier.partition.subtrees import Subtrees, dealt, open_cells, put_together
 from certifier.partition.tree import Node, OpenCell, Streams, joined, of_streams, to_streams
-from certifier.proof.outline import OPEN
-from certifier.proof.partition import EMPTY, PLANE, STREAMS
+from certifier.proof.partition import EMPTY, OPEN, PLANE, STREAMS
 
 N, K = 3, 2
 VERTICES = (4, 2, 3, 1)

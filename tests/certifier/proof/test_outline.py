@@ -14,8 +14,8 @@ from certifier.model import Pair
 from certifier.partition import bodies
 from certifier.partition.certification import CellCertification
 from certifier.proof.container import some_of
-from certifier.proof.outline import FOLDED, OPEN, Counts, Outline, Silhouette, Tree, outlines
-from certifier.proof.partition import EMPTY, PLANE, PartitionProof
+from certifier.proof.outline import FOLDED, Counts, Outline, Silhouette, Tree, outlines
+from certifier.proof.partition import EMPTY, OPEN, PLANE, PartitionProof
 from tests.certifier.scenes import ball, box, cube, planar_arm
 
 N = 3

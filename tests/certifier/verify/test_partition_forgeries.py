@@ -209,7 +209,7 @@ FORGERIES = (
         half_a_tree,
         "the tree of cuts ends before or after its last node",
         (streams.Cuts, "__init__"),
-        "_ends(nodes).tolist() != [len(nodes)]",
+        "len(ends) != trees or ends[-1] != len(nodes)",
     ),
     Forgery(
         "no cut is left unread",

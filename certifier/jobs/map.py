@@ -1,0 +1,129 @@
+"""The map of a scene is grown here, in this process and children of it."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from certifier.errors import CirisError
+from certifier.map.growing import Coverage, Growing, Task
+from certifier.map.pair import Found, PairTree
+from certifier.map.trees import Pairs
+from certifier.model import Array, Scene
+from certifier.orphans import die_with_parent
+from certifier.proof.map import MapProof
+
+Tell = Callable[[str, dict[str, Any]], None]
+
+
+@dataclass(frozen=True)
+class SceneMap:
+    """A map that was grown.
+
+    Attributes:
+        coverage: the share of the free configurations that it proves.
+        looked: how many cells were looked at.
+        cells: how many cells are proved.
+        seconds: how long it took.
+        reason: why it ended: ``coverage``, ``deadline``, or ``nothing_left``.
+    """
+
+    proof: MapProof
+    coverage: Coverage
+    looked: int
+    cells: int
+    seconds: float
+    reason: str
+
+
+def grow_map(
+    scene: Scene,
+    coverage: float,
+    deadline_s: float | None = None,
+    processes: int = 1,
+    tell: Tell = lambda *_: None,
+    at: Array | None = None,
+    seed: int = 0,
+) -> SceneMap:
+    """Grows the map of a scene until it covers this share, or the time is over.
+
+    Args:
+        coverage: share of the free configurations to cover.
+        at: (D, n) configurations in s that are wanted first.
+
+    Raises:
+        CirisError: ``worker_lost``, when a child died.
+    """
+    start = time.perf_counter()
+    growing = Growing(scene, np.zeros((0, scene.n)) if at is None else at, seed)
+    reason = "nothing_left"
+    with _workers(scene, growing, processes) as work:
+        while tasks := growing.round():
+            for task, found in zip(tasks, work(tasks), strict=True):
+                growing.take(task, found)
+            passed, now = time.perf_counter() - start, growing.coverage
+            tell("map", {"seconds": passed, "coverage": now.share, "error": now.error, "cells": growing.planes, "looked": growing.looked})
+            if now.share >= coverage or (deadline_s is not None and passed > deadline_s):
+                reason = "coverage" if now.share >= coverage else "deadline"
+                break
+    seconds = time.perf_counter() - start
+    return SceneMap(growing.proof(), growing.coverage, growing.looked, growing.planes, seconds, reason)
+
+
+class _Worker:
+    """Works on tasks, and keeps the trees that it was asked for."""
+
+    def __init__(self, scene: Scene, known: dict[Pairs, PairTree]) -> None:
+        self._scene, self._known = scene, known
+
+    def __call__(self, task: Task) -> Found:
+        if task.pairs not in self._known:
+            self._known[task.pairs] = PairTree(self._scene, task.pairs)
+        tree = self._known[task.pairs]
+        found = tree.advance(task.given, task.samples, task.weights, task.most, task.water)
+        return tree.verified(task.given, found)
+
+
+@contextmanager
+def _workers(scene: Scene, growing: Growing, processes: int) -> Iterator[Callable[[Sequence[Task]], Iterator[Found]]]:
+    """Yields what works on tasks and gives the results in their order."""
+    worker = _Worker(scene, {pairs: tree.pair for pairs, tree in growing.trees.items()})
+    if processes == 1:
+        yield lambda tasks: map(worker, tasks)
+        return
+    # The children are forked, so they have the trees without making them.
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("fork"), _adopt, (worker, os.getpid())) as executor:
+        try:
+            yield lambda tasks: executor.map(_run, tasks)
+        except BrokenProcessPool as error:
+            problem, hint = (
+                "a process that worked on the map died",
+                "look whether the machine ran out of memory; fewer cores need less of it",
+            )
+            raise CirisError("worker_lost", problem, hint=hint) from error
+        finally:
+            executor.shutdown(cancel_futures=True)
+
+
+_adopted: list[_Worker] = []
+"""This holds the worker of the parent of this process, so that it need not travel to it."""
+
+
+def _adopt(worker: _Worker, parent: int) -> None:
+    die_with_parent(parent=parent)  # the children hold one another's pipes open, so none of these would end
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # a terminal interrupts children too, and they have nothing to say about it
+    _adopted.append(worker)
+
+
+def _run(task: Task) -> Found:
+    return _adopted[0](task)

@@ -1,0 +1,124 @@
+"""Where configurations lie in a tree of cuts: compiled loops over linked nodes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from certifier.model import Array
+from certifier.proof.partition import OPEN, PLANE
+
+FIRST = 1024
+"""A tree has room for this many nodes at first."""
+
+
+class Descent:
+    """Holds a tree of cuts to which subtrees are added in the places of open nodes.
+
+    Nodes are numbered in the order in which they were added; the root is 0.
+
+    Attributes:
+        kinds: int16, the joint that is cut, or the kind of a leaf.
+        values: where it is cut.
+        planes: the number of the plane of a leaf that has one.
+        children: (N, 2) numbers of the lower and the upper part.
+    """
+
+    def __init__(self) -> None:
+        self.kinds = np.full(FIRST, OPEN, np.int16)
+        self.values = np.zeros(FIRST)
+        self.planes = np.zeros(FIRST, np.int32)
+        self.children = np.zeros((FIRST, 2), np.int32)
+        self.size, self.held = 1, 0
+
+    def add(self, places: Array, nodes: Array, cuts: Array) -> Array:
+        """Puts trees in the places of open nodes, and returns the numbers of their own open nodes, in preorder.
+
+        Args:
+            places: numbers of open nodes, one for each tree.
+            nodes, cuts: the trees, one after the other, as a proof holds them (certifier.proof.partition).
+        """
+        needed = self.size + len(nodes)
+        if needed > len(self.kinds):
+            room = max(needed, 2 * len(self.kinds)) - len(self.kinds)
+            self.kinds = np.concatenate([self.kinds, np.full(room, OPEN, np.int16)])
+            self.values = np.concatenate([self.values, np.zeros(room)])
+            self.planes = np.concatenate([self.planes, np.zeros(room, np.int32)])
+            self.children = np.concatenate([self.children, np.zeros((room, 2), np.int32)])
+        self.size, self.held, opened = _add(self.kinds, self.values, self.planes, self.children, self.size, self.held, places, nodes, cuts)
+        return opened
+
+    def in_order(self) -> tuple[Array, Array, Array]:
+        """Returns the tree as a proof has it: nodes, cuts, and the numbers of the planes in their order."""
+        return _preorder(self.kinds, self.values, self.planes, self.children, self.size)
+
+    def leaves(self, X: Array) -> Array:
+        """Returns the numbers of the leaves that points lie in, (N,); a point on a cut is in the lower part.
+
+        Args:
+            X: (N, k) of the joints of the tree.
+        """
+        return locate(self.kinds, self.values, self.children, X)
+
+
+@njit(cache=True)
+def locate(kinds: Array, values: Array, children: Array, X: Array) -> Array:
+    found = np.empty(len(X), np.int32)
+    for i in range(len(X)):
+        node = 0
+        while kinds[node] >= 0:
+            node = children[node, 0 if X[i, kinds[node]] <= values[node] else 1]
+        found[i] = node
+    return found
+
+
+@njit(cache=True)
+def _add(
+    kinds: Array, values: Array, planes: Array, children: Array, size: int, held: int, places: Array, nodes: Array, cuts: Array
+) -> tuple[int, int, Array]:
+    opened = np.empty(len(nodes), np.int64)
+    waiting = np.empty(len(nodes) + 1, np.int64)
+    tree, cut, many, depth = 0, 0, 0, 0
+    for i in range(len(nodes)):
+        if depth == 0:
+            node = places[tree]
+            tree += 1
+        else:
+            depth -= 1
+            node = waiting[depth]
+        kinds[node] = nodes[i]
+        if nodes[i] >= 0:
+            values[node] = cuts[cut]
+            cut += 1
+            children[node, 0], children[node, 1] = size, size + 1
+            waiting[depth], waiting[depth + 1] = size + 1, size
+            depth += 2
+            size += 2
+        elif nodes[i] == PLANE:
+            planes[node] = held
+            held += 1
+        else:
+            opened[many] = node
+            many += 1
+    return size, held, opened[:many].copy()
+
+
+@njit(cache=True)
+def _preorder(kinds: Array, values: Array, planes: Array, children: Array, size: int) -> tuple[Array, Array, Array]:
+    nodes, cuts, held = np.empty(size, np.int8), np.empty(size), np.empty(size, np.int64)
+    waiting = np.zeros(size + 1, np.int64)
+    n, c, p, depth = 0, 0, 0, 1
+    while depth:
+        depth -= 1
+        node = waiting[depth]
+        nodes[n] = kinds[node]
+        n += 1
+        if kinds[node] >= 0:
+            cuts[c] = values[node]
+            c += 1
+            waiting[depth], waiting[depth + 1] = children[node, 1], children[node, 0]
+            depth += 2
+        elif kinds[node] == PLANE:
+            held[p] = planes[node]
+            p += 1
+    return nodes[:n].copy(), cuts[:c].copy(), held[:p].copy()

@@ -1,0 +1,319 @@
+"""Cells of a pair's map are worked on here, in compiled loops: those first in which most is to be gained.
+
+A cell is a box. It goes through these steps, until it has a plane or is cut:
+
+    a configuration of it at which the volumes touch is known   -> it is cut
+    corners and other configurations are looked at              -> where the volumes touch at one of them, it is cut
+    a plane, affine in s, is looked for                         -> there is none: it is cut
+    proofs that all vertices keep to their sides                -> too many pieces: it is cut
+
+Coarse volumes come first, on levels (certifier.partition.levels). A cell that is narrow in all joints that move them goes on to the next
+level, and one that is narrow in all joints stays open.
+"""
+
+from __future__ import annotations
+
+import heapq
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from certifier.map.settle import CONTACTS, DONE, NARROW, TOUCH, Levels, joint_to_cut, middle, settle, turn
+from certifier.model import Array
+from certifier.partition.bodies import Pair
+from certifier.partition.hulls import gaps
+from certifier.partition.sides import Proofs, room_for
+from certifier.proof.partition import OPEN, PLANE
+
+NARROW_COARSE, NARROW_CUT, NARROW_APART = np.radians([15.0, 7.0, 3.5])
+LOOKED_AT, MOSTLY = 16, 0.6
+"""A cell goes on to the next level at once where coarse volumes touch at more than MOSTLY of LOOKED_AT samples in it."""
+
+
+class Work(NamedTuple):
+    """Cells, in growing arrays; a cell is a node of a tree.
+
+    Attributes:
+        kinds, values, children: as certifier.map.descent has them.
+        lower, upper: (N, k) the bounds.
+        level: how many levels, the finest ones, are to be tried; 0 where the cell is not looked at any more.
+        contacts, known: (N, CONTACTS, k) and (N,) configurations at which the volumes of its level touch, and how many are known.
+        begin, end: which part of the order of the samples is in the cell.
+        plane: the number of its plane.
+    """
+
+    kinds: Array
+    values: Array
+    children: Array
+    lower: Array
+    upper: Array
+    level: Array
+    contacts: Array
+    known: Array
+    begin: Array
+    end: Array
+    plane: Array
+
+
+def empty(room: int, k: int) -> Work:
+    """Returns room for this many cells of k joints."""
+    level, known, begin, end, plane = np.zeros((5, room), np.int64)
+    lower, upper = np.empty((2, room, k))
+    kinds, children, contacts = np.full(room, OPEN, np.int16), np.zeros((room, 2), np.int64), np.empty((room, CONTACTS, k))
+    return Work(kinds, np.zeros(room), children, lower, upper, level, contacts, known, begin, end, plane)
+
+
+class Kept(NamedTuple):
+    """The planes that were found, in the order in which they were.
+
+    Attributes:
+        planes, choices: (P, 5, 1 + k), (P,) as a proof has them.
+        bounds: (P + 1, 2) where the nodes of pieces of each plane begin, and how many pieces are before them.
+        held: (1,) how many planes there are.
+    """
+
+    planes: Array
+    choices: Array
+    bounds: Array
+    held: Array
+
+
+@njit(cache=True)
+def advance(
+    pairs: tuple[Pair, ...], levels: Levels, work: Work, given: int, order: Array, samples: Array, weights: Array, most: int, water: float
+) -> tuple[int, int, Kept, Array]:
+    """Works on cells until ``most`` were looked at or none has a weight above ``water``.
+
+    Args:
+        pairs: the volumes of every level, the finest first; LEVELS of them, of which the first ``levels.number`` ones count.
+        given: how many cells there are to begin with, which are the first nodes.
+        order: the numbers of the samples; those of a cell stand together.
+        samples, weights: (S, k), (S,).
+
+    Returns:
+        How many nodes there are now, how many cells were looked at, the planes, and their pieces.
+    """
+    k, vertices, most_pieces = samples.shape[1], 0, 0
+    for pair in pairs:
+        most_pieces = max(most_pieces, pair.pieces)
+        vertices = max(vertices, len(pair.first.vertices) + len(pair.second.vertices))
+    proofs, first = room_for(vertices, most_pieces), np.zeros(3, np.int64)
+    kept = Kept(np.zeros((most, 5, 1 + k)), np.empty(most, np.int8), np.zeros((most + 1, 2), np.int64), np.zeros(1, np.int64))
+    pieces, size, looked = np.empty(2 * len(proofs.pieces), np.int8), given, 0
+    heap = [(-_weight(work, order, weights, i), i) for i in range(given)]
+    heapq.heapify(heap)
+    while len(heap) and looked < most:
+        weight, cell = heapq.heappop(heap)
+        if -weight <= water:
+            break
+        looked += 1
+        begin = kept.bounds[kept.held[0], 0]
+        if begin + len(proofs.pieces) > len(pieces):
+            pieces = np.concatenate((pieces, np.empty_like(pieces)))
+        joint = _tried(pairs, levels, work, cell, order, samples, proofs, first, kept, pieces[begin:])
+        if joint >= 0 and _cut(levels, work, cell, size, joint, order, samples):
+            for child in range(size, size + 2):
+                of_child = _weight(work, order, weights, child)
+                if of_child > 0:
+                    heapq.heappush(heap, (-of_child, child))
+            size += 2
+    return size, looked, kept, pieces
+
+
+@njit(cache=True)
+def _weight(work: Work, order: Array, weights: Array, cell: int) -> float:
+    """Returns the weight of the samples in a cell."""
+    total = 0.0
+    for x in range(work.begin[cell], work.end[cell]):
+        total += weights[order[x]]
+    return total
+
+
+@njit(cache=True, inline="always")
+def _tried(
+    pairs: tuple[Pair, ...],
+    levels: Levels,
+    work: Work,
+    cell: int,
+    order: Array,
+    samples: Array,
+    proofs: Proofs,
+    first: Array,
+    kept: Kept,
+    pieces: Array,
+) -> int:
+    """Tries a cell with one level after the other, and returns the joint to cut it in; -1 for a cell that has a plane now."""
+    lower, upper, s, level = work.lower[cell], work.upper[cell], np.empty(samples.shape[1]), min(work.level[cell], levels.number) - 1
+    while True:
+        pair = pairs[level]
+        if level and _touch_mostly(pair, order[work.begin[cell] : work.end[cell]], samples):
+            work.known[cell] = 0
+        else:
+            plane = np.empty((5, 1 + len(pair.joints)))
+            kind, work.known[cell], halved = settle(pair, lower, upper, work.contacts[cell], work.known[cell], proofs, first, plane, s)
+            if kind == DONE:
+                work.kinds[cell], work.plane[cell] = PLANE, kept.held[0]
+                _keep(pair, levels.choices[level], plane, proofs, first, kept, pieces)
+                return -1
+            joint = joint_to_cut(pair, levels, level, lower, upper, s, halved)
+            if level == 0 or _worth_a_cut(pair, levels, level, lower, upper, kind, joint):
+                return joint
+        work.level[cell] = level
+        level -= 1
+        # What touches on a finer level is looked at anew.
+        near, still = gaps(pairs[level].a, pairs[level].b, work.contacts[cell, : work.known[cell]]), 0
+        for i in range(len(near)):
+            if near[i] <= 0:
+                work.contacts[cell, still] = work.contacts[cell, i]
+                still += 1
+        work.known[cell] = still
+
+
+@njit(cache=True)
+def _worth_a_cut(pair: Pair, levels: Levels, level: int, lower: Array, upper: Array, kind: int, joint: int) -> bool:
+    """Returns whether a cell is wide enough to be cut in a joint for coarse volumes (certifier.partition.search has the same rule)."""
+    in_all, in_one = NARROW_COARSE, NARROW_CUT
+    if levels.two_chains:
+        in_all, in_one = (np.inf if kind == TOUCH else NARROW_COARSE), 0.0
+    elif levels.many and kind != TOUCH:
+        in_all, in_one = NARROW_APART, 0.0
+    widest = 0.0
+    for j in pair.joints:
+        widest = max(widest, turn(levels, level, j, lower, upper))
+    return widest > in_all and turn(levels, level, joint, lower, upper) > in_one
+
+
+@njit(cache=True)
+def _keep(pair: Pair, choice: int, plane: Array, proofs: Proofs, first: Array, kept: Kept, pieces: Array) -> None:
+    """Keeps a plane and its pieces as a proof has them whose planes move with all joints."""
+    at = kept.held[0]
+    kept.planes[at, :, 0], kept.choices[at] = plane[:, 0], choice
+    for e in range(len(pair.joints)):
+        kept.planes[at, :, 1 + pair.joints[e]] = plane[:, 1 + e]
+    _renumbered(pair, proofs.pieces, first[0], proofs.lengths[0], pieces)
+    for i in range(2):
+        kept.bounds[at + 1, i] = kept.bounds[at, i] + proofs.lengths[i]
+    kept.held[0] += 1
+
+
+@njit(cache=True)
+def _cut(levels: Levels, work: Work, cell: int, size: int, joint: int, order: Array, samples: Array) -> bool:
+    """Cuts a cell in the middle of a joint's range, if it is wide enough; its parts are the nodes ``size`` and ``size`` + 1."""
+    lower, upper, widest = work.lower[cell], work.upper[cell], 0.0
+    for j in range(len(lower)):
+        widest = max(widest, turn(levels, 0, j, lower, upper))
+    value = middle(levels.revolute[joint], lower[joint], upper[joint])
+    if widest < NARROW or not lower[joint] < value < upper[joint]:
+        work.level[cell] = 0
+        return False
+    work.kinds[cell], work.values[cell] = joint, value
+    below = _parted(order, samples, work.begin[cell], work.end[cell], joint, value)
+    for part in range(2):
+        child = size + part
+        work.children[cell, part], work.kinds[child], work.level[child] = child, OPEN, work.level[cell]
+        work.lower[child], work.upper[child] = lower, upper
+        work.begin[child], work.end[child] = (work.begin[cell], below) if part == 0 else (below, work.end[cell])
+        if part == 0:
+            work.upper[child, joint] = value
+        else:
+            work.lower[child, joint] = value
+        known = 0
+        for i in range(work.known[cell]):
+            at = work.contacts[cell, i, joint]
+            if (at <= value) if part == 0 else (at >= value):
+                work.contacts[child, known] = work.contacts[cell, i]
+                known += 1
+        work.known[child] = known
+    return True
+
+
+@njit(cache=True)
+def _touch_mostly(pair: Pair, numbers: Array, samples: Array) -> bool:
+    """Returns whether coarse volumes touch at most of the samples of a cell."""
+    count = min(len(numbers), LOOKED_AT)
+    X = np.empty((count, samples.shape[1]))
+    for i in range(count):
+        X[i] = samples[numbers[i * len(numbers) // count]]
+    return (gaps(pair.a, pair.b, X) <= 0).sum() > MOSTLY * count
+
+
+@njit(cache=True)
+def _renumbered(pair: Pair, pieces: Array, first: int, length: int, to: Array) -> None:
+    """Copies pieces, with the numbers that the axes have where all joints are in play."""
+    for side in range(2):
+        moving = pair.first if side == 0 else pair.second
+        own, outside = moving.own, moving.outside
+        for i in range(0 if side == 0 else first, first if side == 0 else length):
+            axis = pieces[i]
+            if axis >= len(own):
+                joint = outside[axis - len(own)]
+                # The number of the joint among those that do not move this side.
+                axis = len(own)
+                for j in range(joint):
+                    mine = False
+                    for e in own:
+                        mine = mine or e == j
+                    if not mine:
+                        axis += 1
+            to[i] = axis
+
+
+@njit(cache=True)
+def _parted(order: Array, samples: Array, begin: int, end: int, joint: int, value: float) -> int:
+    """Moves the samples of a cell that are below a cut before the others, each in their order, and returns where the others begin."""
+    held = order[begin:end].copy()
+    at = begin
+    for i in held:
+        if samples[i, joint] <= value:
+            order[at] = i
+            at += 1
+    below = at
+    for i in held:
+        if samples[i, joint] > value:
+            order[at] = i
+            at += 1
+    return below
+
+
+@njit(cache=True)
+def preorder(work: Work, given: int, size: int) -> tuple[Array, Array, Array, Array]:
+    """Returns the trees of the first cells, one after the other: nodes and cuts as a proof has them, open cells, and cells with planes."""
+    nodes, cuts = np.empty(size, np.int8), np.empty(size)
+    opened, settled = np.empty(size, np.int64), np.empty(size, np.int64)
+    waiting = np.empty(size + 1, np.int64)
+    n, c, o, p = 0, 0, 0, 0
+    for root in range(given):
+        waiting[0], depth = root, 1
+        while depth:
+            depth -= 1
+            cell = waiting[depth]
+            kind = work.kinds[cell]
+            nodes[n] = kind
+            n += 1
+            if kind >= 0:
+                cuts[c] = work.values[cell]
+                c += 1
+                waiting[depth], waiting[depth + 1] = work.children[cell, 1], work.children[cell, 0]
+                depth += 2
+            elif kind == PLANE:
+                settled[p] = cell
+                p += 1
+            else:
+                opened[o] = cell
+                o += 1
+    return nodes[:n].copy(), cuts[:c].copy(), opened[:o].copy(), settled[:p].copy()
+
+
+@njit(cache=True)
+def in_order(pieces: Array, bounds: Array, planes_of: Array) -> Array:
+    """Returns the pieces of planes in another order."""
+    total = 0
+    for i in planes_of:
+        total += bounds[i + 1, 0] - bounds[i, 0]
+    found, at = np.empty(total, np.int8), 0
+    for i in planes_of:
+        length = bounds[i + 1, 0] - bounds[i, 0]
+        found[at : at + length] = pieces[bounds[i, 0] : bounds[i + 1, 0]]
+        at += length
+    return found

@@ -1,0 +1,235 @@
+"""The map of a scene while it grows: samples say where work is worth most, rounds deal it out, and trees take what was found.
+
+Samples are uniform in q and free of collision. A sample weighs the more, the fewer trees are open at it, because it counts as proved only
+when none is. A cell weighs as much as the samples in it. What is proved is estimated with other samples, which have no weight.
+The rounds are the same whatever the machine does, so the same effort gives the same map.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from certifier.map.descent import Descent
+from certifier.map.pair import Found, OpenCells, PairTree
+from certifier.map.trees import Pairs, Plan
+from certifier.model import Array, Scene
+from certifier.proof.map import MapProof
+from certifier.proof.partition import PLANE
+
+HELD, FIRST, MOST_BATCHES = 4000, 8000, 16
+"""HELD samples say what is proved; FIRST ones say where work is, at first. At most MOST_BATCHES times as many are drawn for that."""
+WANTED, BATCH = 4000, 8192
+"""A batch of BATCH new samples is drawn before a round, while fewer than WANTED are open."""
+LEAST, GROWTH, MOST = 64, 0.1, 2000
+"""A round begins with this share of the cells that were looked at before, but with no fewer than LEAST and no more than MOST cells."""
+DEEPER, WATER = 4, 0.5
+"""Of the cells that a round begins with, and those that they are cut into, DEEPER times as many are looked at, as long as they weigh
+WATER times as much as the lightest of them."""
+TASK = 64
+"""A task begins with at most this many cells."""
+DEMAND = 1000.0
+"""A configuration that was asked for weighs as much as this many samples."""
+
+
+class Task(NamedTuple):
+    """Work on some open cells of a tree.
+
+    Attributes:
+        pairs: which name the tree.
+        nodes: the cells' nodes in it.
+        numbers: of the samples that the cells hold; ``given`` has their places among these.
+    """
+
+    pairs: Pairs
+    nodes: Array
+    numbers: Array
+    given: OpenCells
+    samples: Array
+    weights: Array
+    most: int
+    water: float
+
+
+class Coverage(NamedTuple):
+    """The estimated share of the free configurations that are proved, and its standard error."""
+
+    share: float
+    error: float
+
+
+@dataclass
+class Tree:
+    """A tree with its open cells.
+
+    Attributes:
+        cells: the open cells, with the numbers of the samples in them.
+        nodes: (C,) their nodes.
+        found: the planes, choices, pieces and lengths that were found, in the order in which they were.
+    """
+
+    pair: PairTree
+    descent: Descent
+    cells: OpenCells
+    nodes: Array
+    found: list[tuple[Array, Array, Array, Array]]
+
+    @classmethod
+    def of(cls, pair: PairTree) -> Tree:
+        none = np.zeros(0, np.int8)
+        found = [(np.zeros((0, 5, 1 + pair.scene.n)), none, none, np.zeros((0, 2), np.int64))]
+        return cls(pair, Descent(), pair.root(np.zeros(0, np.int64)), np.zeros(1, np.int64), found)
+
+    def insert(self, numbers: Array, samples: Array) -> Array:
+        """Adds samples, (S, n) with these numbers, to the open cells that they lie in, and returns the numbers of those that do."""
+        leaves = self.descent.leaves(np.ascontiguousarray(samples[:, self.pair.positions]))
+        row = np.full(self.descent.size, -1)
+        row[self.nodes] = np.arange(len(self.nodes))
+        rows = row[leaves]
+        kept = numbers[rows >= 0]
+        lengths = np.diff(self.cells.samples)
+        all_rows = np.concatenate([np.repeat(np.arange(len(lengths)), lengths), rows[rows >= 0]])
+        order = np.argsort(all_rows, kind="stable")
+        begin = np.concatenate([[0], np.cumsum(np.bincount(all_rows, minlength=len(lengths)))])
+        self.cells = self.cells._replace(samples=begin, numbers=np.concatenate([self.cells.numbers, kept])[order])
+        return kept
+
+    def weights(self, of_samples: Array) -> Array:
+        """Returns the weights of the open cells, (C,); 0 for those that are not looked at any more."""
+        sums = np.concatenate([[0.0], np.cumsum(of_samples[self.cells.numbers])])
+        found: Array = sums[self.cells.samples[1:]] - sums[self.cells.samples[:-1]]
+        return np.where(self.cells.level > 0, found, 0.0)
+
+    def take(self, nodes: Array, found: Found) -> None:
+        """Puts what was found in the places of open cells; ``found`` has the numbers of samples."""
+        opened = self.descent.add(nodes, found.nodes, found.cuts)
+        stay = np.flatnonzero(~np.isin(self.nodes, nodes))
+        self.nodes = np.concatenate([self.nodes[stay], opened])
+        self.cells = self.cells.some(stay).with_more(found.left)
+        self.found.append((found.planes, found.choices, found.pieces, found.lengths))
+
+    def planes(self) -> int:
+        """Returns how many cells have a plane."""
+        return self.descent.held
+
+
+class Growing:
+    """A map that grows.
+
+    Args:
+        at: (D, n) configurations in s that are wanted first; those in collision are left out.
+        seed: of every random choice.
+    """
+
+    def __init__(self, scene: Scene, at: Array, seed: int = 0) -> None:
+        self._scene, self._rng = scene, np.random.default_rng(seed)
+        self._samples, self._value = np.zeros((0, scene.n)), np.zeros(0)
+        self._open, self.trees, self.looked = np.zeros(0, np.int64), dict[Pairs, Tree](), 0
+        self._plan = Plan(scene)
+        held = self._free(HELD)
+        for samples, value in ((held, 0.0), (at[self._plan.free(at)], DEMAND), (self._free(FIRST), 1.0)):
+            self._add(samples, value)
+        self._held = len(held)
+
+    @property
+    def coverage(self) -> Coverage:
+        """Returns what is proved, as the held samples say."""
+        share = float((self._open[: self._held] == 0).mean()) if self._held else 1.0
+        return Coverage(share, float(np.sqrt(max(share * (1 - share), 1 / max(self._held, 1)) / max(self._held, 1))))
+
+    @property
+    def planes(self) -> int:
+        """Returns how many cells are proved."""
+        return sum(tree.planes() for tree in self.trees.values())
+
+    def round(self) -> list[Task]:
+        """Returns the tasks of the next round, in an order that is always the same; none where nothing is left to do."""
+        self._draw()
+        of_samples = np.where(self._open > 0, self._value / np.maximum(self._open, 1), 0.0)
+        names = list(self.trees)
+        weights = [self.trees[name].weights(of_samples) for name in names]
+        number = np.repeat(np.arange(len(names)), [len(w) for w in weights])
+        row, weight = np.concatenate([np.arange(len(w)) for w in weights] or [number]), np.concatenate(weights or [np.zeros(0)])
+        best = np.lexsort((row, number, -weight))
+        best = best[: np.count_nonzero(weight > 0)]
+        begin = min(max(LEAST, int(GROWTH * self.looked)), MOST)
+        if not len(best):
+            return []
+        water = WATER * float(weight[best[min(begin, len(best) - 1)]])
+        chosen = np.sort(best[:begin])
+        tasks = []
+        for i in np.unique(number[chosen]).tolist():
+            rows = row[chosen[number[chosen] == i]]
+            tasks += [self._task(names[i], rows[a : a + TASK], of_samples, water) for a in range(0, len(rows), TASK)]
+        return tasks
+
+    def take(self, task: Task, found: Found) -> None:
+        """Takes what was found for a task; the order does not matter to the map."""
+        tree = self.trees[task.pairs]
+        left = found.left._replace(numbers=task.numbers[found.left.numbers])
+        self._open[task.numbers] -= 1
+        self._open[left.numbers] += 1
+        tree.take(task.nodes, found._replace(left=left))
+        self.looked += found.looked
+
+    def proof(self) -> MapProof:
+        """Returns the map as a proof."""
+        maps = []
+        for tree in self.trees.values():
+            nodes, cuts, held = tree.descent.in_order()
+            planes, choices, pieces, lengths = (np.concatenate(parts) for parts in zip(*tree.found, strict=True))
+            ends = np.cumsum(lengths[:, 0])
+            parts = [pieces[ends[i] - lengths[i, 0] : ends[i]] for i in held.tolist()]
+            maps.append(tree.pair.proof(nodes, cuts, planes[held], choices[held], np.concatenate([pieces[:0], *parts]), lengths[held]))
+        return MapProof(self._scene, tuple(self.trees), tuple(maps))
+
+    def _task(self, name: Pairs, rows: Array, of_samples: Array, water: float) -> Task:
+        tree = self.trees[name]
+        given = tree.cells.some(rows)
+        numbers = given.numbers
+        samples = np.ascontiguousarray(self._samples[numbers][:, tree.pair.positions])
+        given = given._replace(numbers=np.arange(len(numbers)))
+        return Task(name, tree.nodes[rows], numbers, given, samples, of_samples[numbers], DEEPER * len(rows), water)
+
+    def _draw(self) -> None:
+        """Draws samples where the map is open, if few are left there."""
+        if np.count_nonzero((self._open > 0) & (self._value > 0)) < WANTED:
+            self._add(self._drawn(BATCH), 1.0)
+
+    def contains(self, samples: Array) -> Array:
+        """Returns which configurations, (S, n) in s, are proved to be free, (S,)."""
+        proved: dict[object, Array] = {pair: np.zeros(len(samples), dtype=bool) for pair in self._scene.pairs}
+        for pairs, tree in self.trees.items():
+            leaves = tree.descent.leaves(np.ascontiguousarray(samples[:, tree.pair.positions]))
+            apart = tree.descent.kinds[leaves] == PLANE
+            for pair in pairs:
+                proved[pair] |= apart
+        return np.logical_and.reduce(list(proved.values())) if proved else np.ones(len(samples), dtype=bool)
+
+    def _add(self, samples: Array, value: float) -> None:
+        begin = len(self._samples)
+        self._samples = np.concatenate([self._samples, samples])
+        self._value = np.concatenate([self._value, np.full(len(samples), value)])
+        self._open = np.concatenate([self._open, np.zeros(len(samples), np.int64)])
+        for pairs, places in self._plan.assigned(samples).items():
+            if pairs not in self.trees:
+                self.trees[pairs] = Tree.of(PairTree(self._scene, pairs))
+            self._open[self.trees[pairs].insert(begin + places, samples[places])] += 1
+
+    def _free(self, count: int) -> Array:
+        """Returns configurations of the scene that are free of collision, at most this many, in s."""
+        found: list[Array] = []
+        for _ in range(MOST_BATCHES):
+            found.append(self._drawn(count))
+            if sum(map(len, found)) >= count:
+                break
+        return np.concatenate(found)[:count]
+
+    def _drawn(self, count: int) -> Array:
+        """Draws configurations and returns those that are free of collision, and that the map does not prove yet, in s."""
+        q = self._rng.uniform(self._scene.q_lower, self._scene.q_upper, size=(count, self._scene.n))
+        samples = self._scene.to_s(q)
+        samples = samples[~self.contains(samples)] if self.trees else samples
+        return samples[self._plan.free(samples)]

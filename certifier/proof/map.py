@@ -1,0 +1,94 @@
+"""The map of a scene is held here as data: for its pairs, the cells of the joint space in which they are proved apart.
+
+A pair's map is a partition of the box of its joints (certifier.proof.partition), some cells of which are open: nothing is said about
+them. It is about the pair's own scene (certifier.proof.sub_scene), so it serves every scene with such a pair. One map may be about
+several pairs between the same two rigid parts, and several maps may be about one pair. A configuration is proved to be free where every
+pair of the scene has a map that has a plane there.
+
+Nothing here decides whether a proof holds: certifier.verify does. docs/proofs.md describes the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from certifier.document import Node
+from certifier.errors import ProofError
+from certifier.model import Pair, Scene
+from certifier.proof import limits
+from certifier.proof.container import FORMAT, Arrays, head, malformed, pack, unpack
+from certifier.proof.partition import OPEN, PLANE, PartitionProof
+from certifier.proof.sub_scene import sub_scene
+
+
+@dataclass(frozen=True)
+class PairMap(PartitionProof):
+    """Holds the cells in which two volumes are proved apart, and those that are open.
+
+    It is about a scene whose joints are those between the volumes (certifier.proof.sub_scene). The nodes of the tree of cuts may be OPEN.
+    """
+
+    KIND: ClassVar[str] = "cells"
+    LEAVES: ClassVar[tuple[int, ...]] = (PLANE, OPEN)
+
+
+@dataclass(frozen=True)
+class MapProof:
+    """Holds the map of a scene.
+
+    Attributes:
+        pairs: which pairs of the scene each of the maps is about, in the order of the map's own.
+        maps: they are about what :func:`sub_scene` gives for these pairs.
+    """
+
+    scene: Scene
+    pairs: tuple[tuple[Pair, ...], ...]
+    maps: tuple[PairMap, ...]
+
+    def to_bytes(self) -> bytes:
+        """Returns the map as a file, in which each pair's map is a file of its own."""
+        header = {
+            "format": FORMAT,
+            "kind": "map",
+            "scene": self.scene.to_document(),
+            "pairs": [[[pair.a, pair.b] for pair in pairs] for pairs in self.pairs],
+        }
+        return pack(header, {f"map/{i}": np.frombuffer(part.to_bytes(), np.int8) for i, part in enumerate(self.maps)})
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> MapProof:
+        """Reads what :meth:`to_bytes` writes.
+
+        Raises:
+            ProofError: the file is no map.
+        """
+        header, unpacked = unpack(data, "map")
+        with malformed():
+            fields, arrays = head(header, "pairs"), Arrays(unpacked)
+            scene = Scene.from_document(header["scene"])
+            known = {(pair.a, pair.b): pair for pair in scene.pairs}
+            pairs = tuple(_pairs(node, known) for node in fields["pairs"].items(limits.PROOFS))
+            maps = tuple(
+                PairMap.from_bytes(arrays.take(f"map/{i}", "int8").tobytes(), sub_scene(scene, about).scene)
+                for i, about in enumerate(pairs)
+            )
+            arrays.end()
+            return cls(scene, pairs, maps)
+
+
+def _pairs(node: Node, known: Mapping[tuple[str, str], Pair]) -> tuple[Pair, ...]:
+    """Returns pairs of the scene from their names."""
+    found = []
+    for item in node.items(limits.PAIRS):
+        names = item.two()
+        pair = known.get((names[0].text(), names[1].text()))
+        if pair is None:
+            raise ProofError("proof_pair", f"{item.where} is no pair of the scene")
+        found.append(pair)
+    if not found:
+        raise ProofError("proof_pair", f"{node.where} names no pair")
+    return tuple(found)

@@ -1,0 +1,140 @@
+"""Maps of small arms: what they prove is true, what they cover, and that the effort alone decides."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from certifier.jobs.map import grow_map
+from certifier.map.growing import Growing
+from certifier.model import WORLD, JointKind
+from certifier.pair.collisions import in_collision
+from certifier.proof.map import MapProof, PairMap
+from certifier.proof.partition import OPEN, PLANE
+from certifier.proof.sub_scene import sub_scene
+from certifier.verify.map import verify_map
+from tests.certifier.scenes import ball, beads, box, hand, planar_arm, two_arms
+
+CROWDED = box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 0.9, 0.0))
+
+
+def scenes():
+    slide = planar_arm(2, CROWDED)
+    return {
+        "boxes": planar_arm(2, CROWDED),
+        "ball": planar_arm(2, ball("world/obstacle", WORLD, 0.2, (0.8, 0.9, 0.0)), padding=0.01),
+        "beads": beads(3),
+        "hand": hand(),
+        "two arms": two_arms(2, apart=3.0),
+        "slide": replace(slide, joints=(replace(slide.joints[0], kind=JointKind.PRISMATIC), slide.joints[1])),
+    }
+
+
+@pytest.fixture(scope="module", params=scenes())
+def grown(request):
+    scene = scenes()[request.param]
+    return scene, grow_map(scene, 0.95, deadline_s=30)
+
+
+def samples_of(scene, count=20000):
+    q = np.random.default_rng(7).uniform(scene.q_lower, scene.q_upper, size=(count, scene.n))
+    return scene.to_s(q)
+
+
+def inside(scene, proof: MapProof, samples):
+    """Which configurations the map proves to be free, by a walk through the proof's own streams."""
+    free = dict.fromkeys(scene.pairs, np.zeros(len(samples), dtype=bool))
+    for pairs, part in zip(proof.pairs, proof.maps, strict=True):
+        apart = in_planes(part, samples[:, sub_scene(scene, pairs).positions])
+        free |= {pair: free[pair] | apart for pair in pairs}
+    return np.logical_and.reduce(list(free.values()))
+
+
+def in_planes(part: PairMap, s):
+    """Which configurations (S, k) lie in a cell that has a plane."""
+    nodes, cuts, apart = iter(part.nodes.tolist()), iter(part.cuts.tolist()), np.zeros(len(s), dtype=bool)
+
+    def walk(here):
+        kind = next(nodes)
+        if kind >= 0:
+            cut = next(cuts)
+            walk(here & (s[:, kind] <= cut))
+            walk(here & (s[:, kind] > cut))
+        elif kind == PLANE:
+            apart[here] = True
+
+    walk(np.ones(len(s), dtype=bool))
+    return apart
+
+
+def test_most_of_the_free_configurations_are_proved_and_none_in_collision(grown):
+    scene, found = grown
+    samples = samples_of(scene)
+    collides, proved = in_collision(scene, samples), inside(scene, found.proof, samples)
+    assert not (collides & proved).any()
+    share = proved[~collides].mean()
+    assert share >= 0.93
+    assert found.coverage.share == pytest.approx(share, abs=0.03)
+    assert found.reason == "coverage"
+
+
+def test_its_file_is_read_again_and_holds(grown):
+    scene, found = grown
+    data = found.proof.to_bytes()
+    assert MapProof.from_bytes(data).to_bytes() == data
+    statement = verify_map(data)
+    assert statement.cells == found.cells
+    assert statement.missing == 0
+    assert statement.scene.hash == scene.hash
+
+
+def test_the_same_effort_gives_the_same_map_whatever_the_processes(grown):
+    scene, found = grown
+    assert grow_map(scene, 0.95, processes=2).proof.to_bytes() == found.proof.to_bytes()
+
+
+def test_bodies_that_always_touch_have_no_cells():
+    scene = planar_arm(1, box("world/obstacle", WORLD, (0.3, 0.3, 0.3)))
+    found = grow_map(scene, 0.9, deadline_s=10)
+    assert (found.cells, found.reason) == (0, "nothing_left")
+    assert verify_map(found.proof.to_bytes()).missing == 1
+
+
+def grown_until(growing, enough):
+    """Lets a map grow until it has enough, or nothing is left to do, and returns how many cells were looked at."""
+    while not enough(growing) and (tasks := growing.round()):
+        for task in tasks:
+            tree = growing.trees[task.pairs].pair
+            growing.take(task, tree.advance(task.given, task.samples, task.weights, task.most, task.water))
+    return growing.looked
+
+
+def test_wanted_configurations_come_first():
+    """A configuration that is among the last ones without a demand."""
+    scene = planar_arm(3, CROWDED, limit=2.5)
+    samples, growing = samples_of(scene, 2000), Growing(scene, np.zeros((0, 3)))
+    grown_until(growing, lambda growing: growing.coverage.share > 0.8)
+    early = growing.contains(samples)
+    grown_until(growing, lambda growing: growing.coverage.share > 0.93)
+    late = samples[growing.contains(samples) & ~early][:1]
+    efforts = [grown_until(Growing(scene, at), lambda growing: growing.contains(late).any()) for at in (late, late[:0])]
+    assert efforts[0] < 0.5 * efforts[1]
+
+
+def test_what_the_verifier_refuses_stays_open():
+    """A worker that finds wrong planes costs cells, and nothing wrong is taken."""
+    scene = planar_arm(2, CROWDED)
+    growing = Growing(scene, np.zeros((0, 2)))
+    (task, *_) = growing.round()
+    tree = growing.trees[task.pairs].pair
+    found = tree.advance(task.given, task.samples, task.weights, 50, 0.0)
+    assert len(found.planes) > 0
+    assert tree.verified(task.given, found) is found
+    refused = tree.verified(task.given, found._replace(planes=-found.planes))
+    assert (len(refused.planes), refused.nodes.tolist()) == (0, [OPEN])
+    before = growing.coverage
+    growing.take(task, refused)
+    assert growing.coverage == before
+    assert not growing.trees[task.pairs].weights(np.ones(100000)).any()

@@ -1,0 +1,47 @@
+"""``ciris map`` as users run it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tests.client.conftest import PLANAR, Ciris
+
+
+def test_a_map_is_grown_and_its_file_holds(ciris: Ciris, tmp_path: Path) -> None:
+    done = ciris("map", PLANAR, "--local", "--coverage", "0.5", "--at", "0,0", "--out", "planar.proof")
+    assert done.status == 0
+    assert "% of the free configurations proved" in done.stdout
+    assert "check it: ciris verify planar.proof" in done.stdout
+    checked = ciris("verify", "planar.proof", "--json")
+    assert (checked.status, checked.json["kind"], checked.json["guarantee"]) == (0, "map", "exact")
+
+
+def test_it_can_be_read_by_programs(ciris: Ciris, tmp_path: Path) -> None:
+    found = ciris("map", PLANAR, "--local", "--coverage", "0.5", "--json").json
+    assert found["ended"] == "coverage"
+    assert 0.5 <= found["coverage"]["value"] <= 1
+    assert 0 < found["coverage"]["stderr"] < 0.02
+    assert found["cells"] > 10
+    assert (tmp_path / found["proof"]).is_file()
+
+
+def test_a_deadline_leaves_the_map_so_far(ciris: Ciris, tmp_path: Path) -> None:
+    done = ciris("map", PLANAR, "--local", "--coverage", "1", "--deadline", "0.01", "--json")
+    assert (done.status, done.json["ended"]) == (1, "deadline")
+    assert ciris("verify", done.json["proof"]).status == 0
+
+
+def test_bad_input_is_named(ciris: Ciris, tmp_path: Path) -> None:
+    for arguments, words in (
+        ((PLANAR,), "--local"),
+        (("missing.yaml", "--local"), "missing.yaml"),
+        ((PLANAR, "--local", "--coverage", "1.5"), "--coverage"),
+        ((PLANAR, "--local", "--at", "0"), "--at"),
+        ((PLANAR, "--local", "--at", "0,400"), "--at"),
+        ((PLANAR, "--local", "--priority", "1"), "--priority"),
+        ((PLANAR, "--local", "--out", "."), "--out"),
+    ):
+        done = ciris("map", *arguments)
+        assert (done.status, done.raw) == (2, b""), arguments
+        assert words in done.error, arguments
+    assert not list(tmp_path.glob("*.proof"))
