@@ -21,7 +21,7 @@ from client.options import MAP
 from client.output import Screen, print_json
 from client.request import refuse_of_service, request
 
-OK, NO = 0, 1
+OK, NO, INTERRUPTED = 0, 1, 130
 NOT_YET = "add --local: the service has no jobs of this kind yet"
 
 
@@ -63,6 +63,8 @@ def grow(args: Namespace) -> int:
     else:
         print(f"{scene.name}: {_said(share, error, found.cells)}, {output.seconds(found.seconds)}")
         print(f"proof {path} (check it: ciris verify {path})")
+    if found.reason == "interrupted":
+        return INTERRUPTED
     return OK if share >= options.coverage else NO
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import os
 import signal
@@ -24,6 +25,8 @@ from certifier.orphans import die_with_parent
 from certifier.proof.map import MapProof
 
 Tell = Callable[[str, dict[str, Any]], None]
+Work = Callable[[Sequence[Task]], Iterator[Found]]
+"""Works on tasks, and gives the results in their order."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,7 @@ class SceneMap:
         looked: how many cells were looked at.
         cells: how many cells are proved.
         seconds: how long it took.
-        reason: why it ended: ``coverage``, ``deadline``, or ``nothing_left``.
+        reason: why it ended: ``coverage``, ``deadline``, ``nothing_left`` or ``interrupted``.
     """
 
     proof: MapProof
@@ -55,7 +58,7 @@ def grow_map(
     at: Array | None = None,
     seed: int = 0,
 ) -> SceneMap:
-    """Grows the map of a scene until it covers this share, or the time is over.
+    """Grows the map of a scene until it covers this share, or the time is over, or somebody interrupts it.
 
     Args:
         coverage: share of the free configurations to cover.
@@ -66,18 +69,45 @@ def grow_map(
     """
     start = time.perf_counter()
     growing = Growing(scene, np.zeros((0, scene.n)) if at is None else at, seed)
-    reason = "nothing_left"
-    with _workers(scene, growing, processes) as work:
-        while tasks := growing.round():
-            for task, found in zip(tasks, work(tasks), strict=True):
-                growing.take(task, found)
-            passed, now = time.perf_counter() - start, growing.coverage
-            tell("map", {"seconds": passed, "coverage": now.share, "error": now.error, "cells": growing.planes, "looked": growing.looked})
-            if now.share >= coverage or (deadline_s is not None and passed > deadline_s):
-                reason = "coverage" if now.share >= coverage else "deadline"
-                break
+    end = math.inf if deadline_s is None else start + deadline_s
+    with _workers(scene, growing, processes) as work, _interrupts() as interrupted:
+        reason = _grown(growing, work, coverage, start, end, interrupted, tell)
     seconds = time.perf_counter() - start
     return SceneMap(growing.proof(), growing.coverage, growing.looked, growing.planes, seconds, reason)
+
+
+def _grown(growing: Growing, work: Work, coverage: float, start: float, end: float, interrupted: Callable[[], bool], tell: Tell) -> str:
+    """Grows a map until it covers enough, or the time is over, and returns why it ended. A task is taken as a whole or not at all."""
+    while tasks := growing.round():
+        for task, found in zip(tasks, work(tasks), strict=True):
+            growing.take(task, found)
+            if interrupted():
+                return "interrupted"
+            if time.perf_counter() > end:
+                return "deadline"
+        now = growing.coverage
+        seconds = time.perf_counter() - start
+        tell("map", {"seconds": seconds, "coverage": now.share, "error": now.error, "cells": growing.planes, "looked": growing.looked})
+        if now.share >= coverage:
+            return "coverage"
+    return "nothing_left"
+
+
+@contextmanager
+def _interrupts() -> Iterator[Callable[[], bool]]:
+    """Yields what says whether somebody has interrupted this process, which does not end it. A second time does."""
+    seen: list[int] = []
+    before = signal.getsignal(signal.SIGINT)
+
+    def note(number: int, _: object) -> None:
+        seen.append(number)
+        signal.signal(signal.SIGINT, before)
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield lambda: bool(seen)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 class _Worker:
@@ -95,8 +125,8 @@ class _Worker:
 
 
 @contextmanager
-def _workers(scene: Scene, growing: Growing, processes: int) -> Iterator[Callable[[Sequence[Task]], Iterator[Found]]]:
-    """Yields what works on tasks and gives the results in their order."""
+def _workers(scene: Scene, growing: Growing, processes: int) -> Iterator[Work]:
+    """Yields what works on tasks."""
     worker = _Worker(scene, {pairs: tree.pair for pairs, tree in growing.trees.items()})
     if processes == 1:
         yield lambda tasks: map(worker, tasks)
@@ -106,11 +136,8 @@ def _workers(scene: Scene, growing: Growing, processes: int) -> Iterator[Callabl
         try:
             yield lambda tasks: executor.map(_run, tasks)
         except BrokenProcessPool as error:
-            problem, hint = (
-                "a process that worked on the map died",
-                "look whether the machine ran out of memory; fewer cores need less of it",
-            )
-            raise CirisError("worker_lost", problem, hint=hint) from error
+            hint = "look whether the machine ran out of memory; fewer cores need less of it"
+            raise CirisError("worker_lost", "a process that worked on the map died", hint=hint) from error
         finally:
             executor.shutdown(cancel_futures=True)
 
@@ -121,7 +148,7 @@ _adopted: list[_Worker] = []
 
 def _adopt(worker: _Worker, parent: int) -> None:
     die_with_parent(parent=parent)  # the children hold one another's pipes open, so none of these would end
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # a terminal interrupts children too, and they have nothing to say about it
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal interrupts children too, but their parent says when they end
     _adopted.append(worker)
 
 

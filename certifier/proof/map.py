@@ -10,7 +10,7 @@ Nothing here decides whether a proof holds: certifier.verify does. docs/proofs.m
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -21,7 +21,7 @@ from certifier.errors import ProofError
 from certifier.model import Pair, Scene
 from certifier.proof import limits
 from certifier.proof.container import FORMAT, Arrays, head, malformed, pack, unpack
-from certifier.proof.partition import OPEN, PLANE, PartitionProof
+from certifier.proof.partition import OPEN, PLANE, STREAMS, PartitionProof
 from certifier.proof.sub_scene import sub_scene
 
 
@@ -60,24 +60,38 @@ class MapProof:
         return pack(header, {f"map/{i}": np.frombuffer(part.to_bytes(), np.int8) for i, part in enumerate(self.maps)})
 
     @classmethod
-    def from_bytes(cls, data: bytes) -> MapProof:
+    def from_bytes(cls, data: bytes, check: Callable[[Scene], None] = lambda _: None) -> MapProof:
         """Reads what :meth:`to_bytes` writes.
 
+        Args:
+            check: refuses a scene that makes no sense, before anything is made of it; of files from strangers it has to.
+
         Raises:
-            ProofError: the file is no map.
+            ProofError: the file is no map, or too large; or what ``check`` raises.
         """
         header, unpacked = unpack(data, "map")
         with malformed():
             fields, arrays = head(header, "pairs"), Arrays(unpacked)
             scene = Scene.from_document(header["scene"])
+            check(scene)
             known = {(pair.a, pair.b): pair for pair in scene.pairs}
             pairs = tuple(_pairs(node, known) for node in fields["pairs"].items(limits.PROOFS))
-            maps = tuple(
-                PairMap.from_bytes(arrays.take(f"map/{i}", "int8").tobytes(), sub_scene(scene, about).scene)
-                for i, about in enumerate(pairs)
-            )
+            _check_size(scene, pairs)
+            maps, size = list[PairMap](), 0
+            for i, about in enumerate(pairs):
+                maps.append(PairMap.from_bytes(arrays.take(f"map/{i}", "int8").tobytes(), sub_scene(scene, about).scene))
+                size += sum(getattr(maps[-1], name).nbytes for name in STREAMS)
+                if size > limits.UNPACKED_BYTES:
+                    raise ProofError("proof_too_large", f"the trees of a map have more than {limits.UNPACKED_BYTES} bytes")
             arrays.end()
-            return cls(scene, pairs, maps)
+            return cls(scene, pairs, tuple(maps))
+
+
+def _check_size(scene: Scene, pairs: Sequence[Sequence[Pair]]) -> None:
+    """Refuses a map that names its pairs' geometries so often that it takes long to say what each tree is about."""
+    count = sum(len(scene.geometry(name).vertices) for about in pairs for pair in about for name in (pair.a, pair.b))
+    if count > limits.CONTAINED:
+        raise ProofError("proof_too_large", "the trees of a map are about more vertices than are checked")
 
 
 def _pairs(node: Node, known: Mapping[tuple[str, str], Pair]) -> tuple[Pair, ...]:

@@ -65,9 +65,8 @@ def verify_map(data: bytes, processes: int = 1, progress: Progress | None = None
     Raises:
         ProofError: the file is malformed or a cell does not hold.
     """
-    proof = MapProof.from_bytes(data)
+    proof = MapProof.from_bytes(data, check_scene)
     scene = proof.scene
-    check_scene(scene)
     for pairs, part in zip(proof.pairs, proof.maps, strict=True):
         check_scene(part.scene)
         check_ground(part.scene, part.ground)

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from pathlib import Path
 
+import pytest
+
+from client.output import Screen
 from tests.client.conftest import PLANAR, Ciris
 
 
@@ -29,6 +34,15 @@ def test_a_deadline_leaves_the_map_so_far(ciris: Ciris, tmp_path: Path) -> None:
     done = ciris("map", PLANAR, "--local", "--coverage", "1", "--deadline", "0.01", "--json")
     assert (done.status, done.json["ended"]) == (1, "deadline")
     assert ciris("verify", done.json["proof"]).status == 0
+
+
+def test_what_is_proved_stays_when_somebody_interrupts(ciris: Ciris, monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patched:
+        patched.setattr(Screen, "status", lambda *_: os.kill(os.getpid(), signal.SIGINT))
+        done = ciris("map", PLANAR, "--local", "--coverage", "1", "--out", "planar.proof")
+    assert done.status == 130
+    assert "% of the free configurations proved" in done.stdout
+    assert ciris("verify", "planar.proof").status == 0
 
 
 def test_bad_input_is_named(ciris: Ciris, tmp_path: Path) -> None:

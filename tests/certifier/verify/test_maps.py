@@ -12,8 +12,10 @@ from certifier.errors import ProofError
 from certifier.jobs.map import grow_map
 from certifier.model import WORLD, Pair
 from certifier.pair.collisions import in_collision
+from certifier.proof import container, limits
+from certifier.proof.container import pack, unpack
 from certifier.proof.map import MapProof
-from certifier.proof.partition import EMPTY, OPEN, PLANE
+from certifier.proof.partition import EMPTY, OPEN, PLANE, STREAMS
 from certifier.proof.sub_scene import sub_scene
 from certifier.verify.file import answer
 from certifier.verify.map import verify_map
@@ -149,3 +151,25 @@ def test_files_with_changed_bytes_get_an_answer(proof):
         found = answer(bytes(cut))
         if found["holds"]:
             assert MapProof.from_bytes(bytes(cut)).to_bytes() == data
+
+
+def test_scenes_of_strangers_are_looked_at_before_anything_is_made_of_them(proof):
+    """Two joints that hang on each other would never lead to the world."""
+    header, arrays = unpack(proof.to_bytes(), "map")
+    joints = header["scene"]["joints"]
+    joints[0]["parent"], joints[1]["parent"] = joints[1]["child"], joints[0]["child"]
+    del header["scene"]["hash"]
+    with pytest.raises(ProofError) as refused:
+        verify_map(pack(header, arrays))
+    assert refused.value.code == "proof_model"
+
+
+@pytest.mark.parametrize(("limit", "what"), [("CONTAINED", "vertices"), ("UNPACKED_BYTES", "bytes")])
+def test_maps_that_would_take_too_long_are_refused(proof, monkeypatch, limit, what):
+    data = proof.to_bytes()
+    size = sum(getattr(part, name).nbytes for part in proof.maps for name in STREAMS)
+    monkeypatch.setattr(container, "_most", lambda _: 1 << 30)
+    monkeypatch.setattr(limits, limit, {"CONTAINED": 20, "UNPACKED_BYTES": size - 1}[limit])
+    with pytest.raises(ProofError, match=what) as refused:
+        verify_map(data)
+    assert refused.value.code == "proof_too_large"
