@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from certifier.errors import CirisError
 from certifier.map.growing import Coverage, Growing, Task
 from certifier.map.pair import Found, PairTree
 from certifier.map.trees import Pairs
@@ -37,14 +36,19 @@ class SceneMap:
         coverage: the share of the free configurations that it proves.
         looked: how many cells were looked at.
         cells: how many cells are proved.
+        refused: how many tasks were given up because the verifier refused what they found.
+        wanted: ``proved``, ``open`` or ``in_collision`` for each of the configurations that were wanted first.
         seconds: how long it took.
-        reason: why it ended: ``coverage``, ``deadline``, ``nothing_left`` or ``interrupted``.
+        reason: why it ended: ``coverage``, ``deadline``, ``nothing_left``, ``size`` where the verifier would not read a larger file,
+            ``interrupted``, or ``worker_lost`` where a child died.
     """
 
     proof: MapProof
     coverage: Coverage
     looked: int
     cells: int
+    refused: int
+    wanted: list[str]
     seconds: float
     reason: str
 
@@ -63,17 +67,20 @@ def grow_map(
     Args:
         coverage: share of the free configurations to cover.
         at: (D, n) configurations in s that are wanted first.
-
-    Raises:
-        CirisError: ``worker_lost``, when a child died.
     """
     start = time.perf_counter()
-    growing = Growing(scene, np.zeros((0, scene.n)) if at is None else at, seed)
     end = math.inf if deadline_s is None else start + deadline_s
-    with _workers(scene, growing, processes) as work, _interrupts() as interrupted:
-        reason = _grown(growing, work, coverage, start, end, interrupted, tell)
-    seconds = time.perf_counter() - start
-    return SceneMap(growing.proof(), growing.coverage, growing.looked, growing.planes, seconds, reason)
+    at = np.zeros((0, scene.n)) if at is None else at
+    with _interrupts() as interrupted:
+        growing = Growing(scene, at, seed)
+        with _workers(scene, growing, processes) as work:
+            try:
+                reason = _grown(growing, work, coverage, start, end, interrupted, tell)
+            except BrokenProcessPool:
+                reason = "worker_lost"
+        proof, seconds = growing.proof(), time.perf_counter() - start
+    wanted = np.where(growing.contains(at), "proved", np.where(growing.is_free(at), "open", "in_collision")).tolist()
+    return SceneMap(proof, growing.coverage, growing.looked, growing.planes, growing.refused, wanted, seconds, reason)
 
 
 def _grown(growing: Growing, work: Work, coverage: float, start: float, end: float, interrupted: Callable[[], bool], tell: Tell) -> str:
@@ -81,6 +88,8 @@ def _grown(growing: Growing, work: Work, coverage: float, start: float, end: flo
     while tasks := growing.round():
         for task, found in zip(tasks, work(tasks), strict=True):
             growing.take(task, found)
+            if growing.full:
+                return "size"
             if interrupted():
                 return "interrupted"
             if time.perf_counter() > end:
@@ -135,9 +144,6 @@ def _workers(scene: Scene, growing: Growing, processes: int) -> Iterator[Work]:
     with ProcessPoolExecutor(processes, multiprocessing.get_context("fork"), _adopt, (worker, os.getpid())) as executor:
         try:
             yield lambda tasks: executor.map(_run, tasks)
-        except BrokenProcessPool as error:
-            hint = "look whether the machine ran out of memory; fewer cores need less of it"
-            raise CirisError("worker_lost", "a process that worked on the map died", hint=hint) from error
         finally:
             executor.shutdown(cancel_futures=True)
 

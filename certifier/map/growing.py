@@ -1,7 +1,7 @@
 """The map of a scene while it grows: samples say where work is worth most, rounds deal it out, and trees take what was found.
 
 Samples are uniform in q and free of collision. A sample weighs the more, the fewer trees are open at it, because it counts as proved only
-when none is. A cell weighs as much as the samples in it. What is proved is estimated with other samples, which have no weight.
+when none is. A cell weighs as much as the samples in it. What is proved is estimated with other samples, which weigh nothing.
 The rounds are the same whatever the machine does, so the same effort gives the same map.
 """
 
@@ -16,6 +16,7 @@ from certifier.map.descent import Descent
 from certifier.map.pair import Found, OpenCells, PairTree
 from certifier.map.trees import Pairs, Plan
 from certifier.model import Array, Scene
+from certifier.proof import limits
 from certifier.proof.map import MapProof
 from certifier.proof.partition import PLANE
 
@@ -30,6 +31,8 @@ DEEPER, WATER = 4, 0.5
 WATER times as much as the lightest of them."""
 TASK = 64
 """A task begins with at most this many cells."""
+FULL = 0.9
+"""A map ends with this part of the bytes that the verifier reads."""
 DEMAND = 1000.0
 """A configuration that was asked for weighs as much as this many samples."""
 
@@ -121,23 +124,38 @@ class Growing:
     Args:
         at: (D, n) configurations in s that are wanted first; those in collision are left out.
         seed: of every random choice.
+
+    Attributes:
+        looked: how many cells were looked at.
+        refused: how many tasks were given up because the verifier refused what they found.
     """
 
     def __init__(self, scene: Scene, at: Array, seed: int = 0) -> None:
         self._scene, self._rng = scene, np.random.default_rng(seed)
         self._samples, self._value = np.zeros((0, scene.n)), np.zeros(0)
         self._open, self.trees, self.looked = np.zeros(0, np.int64), dict[Pairs, Tree](), 0
-        self._plan = Plan(scene)
-        held = self._free(HELD)
-        for samples, value in ((held, 0.0), (at[self._plan.free(at)], DEMAND), (self._free(FIRST), 1.0)):
-            self._add(samples, value)
-        self._held = len(held)
+        self._plan, self._bytes, self.refused = Plan(scene), 0, 0
+        self._add(self._free(FIRST), 1.0)
+        self._held = slice(len(self._samples), len(self._samples) + self._add(self._free(HELD), 0.0))
+        self._add(at[self._plan.free(at)], DEMAND)
 
     @property
     def coverage(self) -> Coverage:
         """Returns what is proved, as the held samples say."""
-        share = float((self._open[: self._held] == 0).mean()) if self._held else 1.0
-        return Coverage(share, float(np.sqrt(max(share * (1 - share), 1 / max(self._held, 1)) / max(self._held, 1))))
+        held = self._open[self._held]
+        if not len(held):
+            return Coverage(0.0, 1.0)
+        share = float((held == 0).mean())
+        return Coverage(share, float(np.sqrt(max(share * (1 - share), 1 / len(held)) / len(held))))
+
+    @property
+    def full(self) -> bool:
+        """Returns whether the verifier would not read a larger map."""
+        return self._bytes > FULL * limits.UNPACKED_BYTES or len(self.trees) >= limits.PROOFS
+
+    def is_free(self, samples: Array) -> Array:
+        """Returns which configurations, (S, n) in s, are shown to be free of collision, (S,); the map does not matter."""
+        return self._plan.free(samples)
 
     @property
     def planes(self) -> int:
@@ -173,6 +191,8 @@ class Growing:
         self._open[left.numbers] += 1
         tree.take(task.nodes, found._replace(left=left))
         self.looked += found.looked
+        self.refused += found.looked == 0
+        self._bytes += found.planes.nbytes + found.pieces.nbytes + 9 * len(found.nodes) + 2 * int(found.lengths[:, 1].sum())
 
     def proof(self) -> MapProof:
         """Returns the map as a proof."""
@@ -208,7 +228,8 @@ class Growing:
                 proved[pair] |= apart
         return np.logical_and.reduce(list(proved.values())) if proved else np.ones(len(samples), dtype=bool)
 
-    def _add(self, samples: Array, value: float) -> None:
+    def _add(self, samples: Array, value: float) -> int:
+        """Adds configurations, (S, n) in s and free of collision, which weigh this, and returns how many they are."""
         begin = len(self._samples)
         self._samples = np.concatenate([self._samples, samples])
         self._value = np.concatenate([self._value, np.full(len(samples), value)])
@@ -217,6 +238,7 @@ class Growing:
             if pairs not in self.trees:
                 self.trees[pairs] = Tree.of(PairTree(self._scene, pairs))
             self._open[self.trees[pairs].insert(begin + places, samples[places])] += 1
+        return len(samples)
 
     def _free(self, count: int) -> Array:
         """Returns configurations of the scene that are free of collision, at most this many, in s."""

@@ -120,6 +120,16 @@ def header_of(data: bytes) -> dict[str, Any]:
         return header
 
 
+def unpacked_size(data: bytes) -> int:
+    """Returns how many bytes the members of a file have together when they are inflated.
+
+    Raises:
+        ProofError: this is no file of this format, or it is beyond the limits.
+    """
+    with _opened(data) as (archive, _):
+        return sum(info.file_size for info in archive.infolist())
+
+
 def some_of(data: bytes, wanted: Wanted) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """Returns the header of a file of any kind and the wanted arrays.
 

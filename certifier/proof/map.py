@@ -20,9 +20,9 @@ from certifier.document import Node
 from certifier.errors import ProofError
 from certifier.model import Pair, Scene
 from certifier.proof import limits
-from certifier.proof.container import FORMAT, Arrays, head, malformed, pack, unpack
-from certifier.proof.partition import OPEN, PLANE, STREAMS, PartitionProof
-from certifier.proof.sub_scene import sub_scene
+from certifier.proof.container import FORMAT, Arrays, head, malformed, pack, unpack, unpacked_size
+from certifier.proof.partition import OPEN, PLANE, PartitionProof
+from certifier.proof.sub_scene import sub_scene, way
 
 
 @dataclass(frozen=True)
@@ -79,19 +79,20 @@ class MapProof:
             _check_size(scene, pairs)
             maps, size = list[PairMap](), 0
             for i, about in enumerate(pairs):
-                maps.append(PairMap.from_bytes(arrays.take(f"map/{i}", "int8").tobytes(), sub_scene(scene, about).scene))
-                size += sum(getattr(maps[-1], name).nbytes for name in STREAMS)
+                file = arrays.take(f"map/{i}", "int8").tobytes()
+                size += unpacked_size(file)
                 if size > limits.UNPACKED_BYTES:
                     raise ProofError("proof_too_large", f"the trees of a map have more than {limits.UNPACKED_BYTES} bytes")
+                maps.append(PairMap.from_bytes(file, sub_scene(scene, about).scene))
             arrays.end()
             return cls(scene, pairs, tuple(maps))
 
 
 def _check_size(scene: Scene, pairs: Sequence[Sequence[Pair]]) -> None:
     """Refuses a map that names its pairs' geometries so often that it takes long to say what each tree is about."""
-    count = sum(len(scene.geometry(name).vertices) for about in pairs for pair in about for name in (pair.a, pair.b))
-    if count > limits.CONTAINED:
-        raise ProofError("proof_too_large", "the trees of a map are about more vertices than are checked")
+    cost = {geometry.name: len(geometry.vertices) + len(way(scene, geometry.body)) for geometry in scene.geometries}
+    if sum(cost[name] for about in pairs for pair in about for name in (pair.a, pair.b)) > limits.CONTAINED:
+        raise ProofError("proof_too_large", "the trees of a map are about more vertices and joints than are checked")
 
 
 def _pairs(node: Node, known: Mapping[tuple[str, str], Pair]) -> tuple[Pair, ...]:

@@ -41,11 +41,11 @@ def sub_scene(scene: Scene, pairs: Sequence[Pair]) -> SubScene:
     """
     sides = [list(dict.fromkeys(getattr(pair, side) for pair in pairs)) for side in ("a", "b")]
     geometries = [scene.geometry(name) for name in dict.fromkeys(sides[0] + sides[1])]
-    ways = [_way(scene, geometry.body) for geometry in geometries]
+    ways = [way(scene, geometry.body) for geometry in geometries]
     shared = next((i for i, level in enumerate(zip(*ways, strict=False)) if len(set(level)) > 1), min(map(len, ways))) - 1
     body = {ways[0][shared]: WORLD}
-    for way in ways:
-        for name in way[shared + 1 :]:
+    for bodies in ways:
+        for name in bodies[shared + 1 :]:
             body.setdefault(name, f"body{len(body)}")
     above = [scene.joint_above[name] for name in list(body)[1:]]
     positions: list[int] = list(dict.fromkeys(joint.index for joint in above if joint.index is not None))
@@ -66,12 +66,12 @@ def sub_scene(scene: Scene, pairs: Sequence[Pair]) -> SubScene:
     return SubScene(found, np.array(positions))
 
 
-def _way(scene: Scene, body: str) -> list[str]:
+def way(scene: Scene, body: str) -> list[str]:
     """Returns the bodies from the world to a body, both included."""
-    way = [body]
-    while way[-1] != WORLD:
-        way.append(scene.joint_above[way[-1]].parent)
-    return way[::-1]
+    found = [body]
+    while found[-1] != WORLD:
+        found.append(scene.joint_above[found[-1]].parent)
+    return found[::-1]
 
 
 def _renamed(joint: Joint, parent: str, child: str, positions: list[int]) -> Joint:

@@ -67,11 +67,13 @@ def verify_map(data: bytes, processes: int = 1, progress: Progress | None = None
     """
     proof = MapProof.from_bytes(data, check_scene)
     scene = proof.scene
+    check_contained(*((part.scene, part.all_volumes) for part in proof.maps))
     for pairs, part in zip(proof.pairs, proof.maps, strict=True):
         check_scene(part.scene)
         check_ground(part.scene, part.ground)
         check_interior(part.scene, part.ground, part.interior)
-        check_contained(part.scene, part.all_volumes)
+        if part.ground.d.size:
+            raise ProofError("proof_ground", "a tree of a map is about a polytope with faces of its own, not about all of the joint limits")
         if part.pairs != part.scene.pairs or len(part.pairs) != len(set(pairs)):
             raise ProofError(
                 "proof_pairs", f"the volumes of a map do not stand for its pairs, the first of which is {pairs[0].a} and {pairs[0].b}"

@@ -61,7 +61,7 @@ def verify_pair(proof: PairProof) -> PairStatement:
     check_scene(proof.scene)
     check_ground(proof.scene, proof.ground)
     check_interior(proof.scene, proof.ground, proof.interior)
-    check_contained(proof.scene, proof.volumes)
+    check_contained((proof.scene, proof.volumes))
     return PairCheck(proof.scene, proof.ground).verify(proof)
 
 

@@ -21,7 +21,7 @@ from certifier.model import Scene, Volume
 from certifier.orphans import die_with_parent
 from certifier.proof.map import PairMap
 from certifier.proof.pair import PairProof
-from certifier.proof.partition import PartitionProof
+from certifier.proof.partition import OPEN, PartitionProof
 from certifier.proof.separation import Separation
 from certifier.verify.pair import PairCheck, PairStatement, check_ground, check_interior
 from certifier.verify.partition import CellCheck, PartitionCheck
@@ -58,10 +58,12 @@ def statements(
         ProofError: one of the proofs does not hold; the first one, in their order.
     """
     if scene is not None:
-        check_contained(scene, {id(volume): volume for proof in proofs for volume in proof.all_volumes}.values())
+        check_contained((scene, {id(volume): volume for proof in proofs for volume in proof.all_volumes}.values()))
     check = _Check(scene, proofs)
     gaps = [np.inf] * len(proofs)
-    sizes = [int(np.count_nonzero(proof.nodes < 0)) if isinstance(proof, PartitionProof) else 1 for proof in proofs]
+    sizes = [
+        int(np.count_nonzero((proof.nodes < 0) & (proof.nodes != OPEN))) if isinstance(proof, PartitionProof) else 1 for proof in proofs
+    ]
     done, total = 0, sum(sizes)
     processes = max(1, min(processes, sum(-(-size // CELLS) for size in sizes)))
     for part, gap in _results(check, processes):
@@ -82,7 +84,7 @@ def gap_of_share(scene: Scene, proof: PartitionProof, share: int, shares: int) -
     Raises:
         ProofError: the proof makes no sense, or a cell of the share does not hold.
     """
-    check_contained(scene, proof.all_volumes)
+    check_contained((scene, proof.all_volumes))
     check = _Check(scene, [proof])
     gap = min((check.gap(part) for part in itertools.islice(check.parts(), share, None, shares)), default=np.inf)
     return check.statement(proof, gap).gap if shares == 1 else gap

@@ -25,23 +25,26 @@ from certifier.verify.kinematics import ExactKinematics, Numbers, exact
 Point = tuple[fmpq, ...]
 
 
-def check_contained(scene: Scene, volumes: Iterable[Volume]) -> None:
-    """Checks that it is within limits to see whether the volumes contain their geometries.
+def check_contained(*parts: tuple[Scene, Iterable[Volume]]) -> None:
+    """Checks that it is within limits to see whether the volumes of all scenes together contain their geometries.
 
     A vertex costs the square of the number of joints that it is taken through: numbers gain bits with each of them.
 
     Raises:
         ProofError: proof_too_large.
     """
-    kinematics, cost = ExactKinematics.at(scene, []), 0
-    for volume in volumes:
-        if not _is_known(scene, volume) or volume.is_geometry_of(scene) or volume.body not in scene.bodies:
-            continue  # check_volume says what is wrong with it
-        for name in volume.geometries:
-            geometry = scene.geometry(name)
-            cost += (1 + len(geometry.vertices)) * (1 + len(kinematics.path(volume.body, geometry.body))) ** 2
-            if cost > limits.CONTAINED:
-                raise ProofError("proof_too_large", "the proof's volumes stand for more vertices, behind more joints, than are checked")
+    cost = 0
+    for scene, volumes in parts:
+        kinematics = ExactKinematics.at(scene, [])
+        for volume in volumes:
+            if not _is_known(scene, volume) or volume.is_geometry_of(scene) or volume.body not in scene.bodies:
+                continue  # check_volume says what is wrong with it
+            for name in volume.geometries:
+                geometry = scene.geometry(name)
+                cost += (1 + len(geometry.vertices)) * (1 + len(kinematics.path(volume.body, geometry.body))) ** 2
+                if cost > limits.CONTAINED:
+                    message = "the proof's volumes stand for more vertices, behind more joints, than are checked"
+                    raise ProofError("proof_too_large", message)
 
 
 def check_volume(scene: Scene, kinematics: ExactKinematics, volume: Volume) -> None:

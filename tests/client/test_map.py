@@ -15,6 +15,7 @@ from tests.client.conftest import PLANAR, Ciris
 def test_a_map_is_grown_and_its_file_holds(ciris: Ciris, tmp_path: Path) -> None:
     done = ciris("map", PLANAR, "--local", "--coverage", "0.5", "--at", "0,0", "--out", "planar.proof")
     assert done.status == 0
+    assert "q = 0, 0: proved" in done.stdout
     assert "% of the free configurations proved" in done.stdout
     assert "check it: ciris verify planar.proof" in done.stdout
     checked = ciris("verify", "planar.proof", "--json")

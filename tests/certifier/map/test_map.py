@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from certifier.jobs.map import grow_map
+from certifier.jobs.map import _adopted, grow_map
 from certifier.map.growing import Growing
 from certifier.model import WORLD, JointKind
 from certifier.pair.collisions import in_collision
+from certifier.proof import limits
 from certifier.proof.map import MapProof, PairMap
 from certifier.proof.partition import OPEN, PLANE
 from certifier.proof.sub_scene import sub_scene
@@ -98,7 +100,7 @@ def test_the_same_effort_gives_the_same_map_whatever_the_processes(grown):
 def test_bodies_that_always_touch_have_no_cells():
     scene = planar_arm(1, box("world/obstacle", WORLD, (0.3, 0.3, 0.3)))
     found = grow_map(scene, 0.9, deadline_s=10)
-    assert (found.cells, found.reason) == (0, "nothing_left")
+    assert (found.cells, found.reason, found.coverage.share) == (0, "nothing_left", 0.0)
     assert verify_map(found.proof.to_bytes()).missing == 1
 
 
@@ -123,6 +125,32 @@ def test_wanted_configurations_come_first():
     assert efforts[0] < 0.5 * efforts[1]
 
 
+def test_a_map_says_of_what_was_wanted_whether_it_is_proved():
+    scene = planar_arm(2, CROWDED)
+    at = scene.to_s(np.array([[-1.0, 0.0], [0.84, 0.0]]))
+    assert grow_map(scene, 0.9, at=at).wanted == ["proved", "in_collision"]
+    assert grow_map(scene, 0.9, deadline_s=0.0, at=at[:1]).wanted in (["open"], ["proved"])
+
+
+def test_a_map_ends_before_the_verifier_would_not_read_it(monkeypatch):
+    monkeypatch.setattr(limits, "UNPACKED_BYTES", 20_000)
+    found = grow_map(planar_arm(2, CROWDED), 1.0)
+    assert found.reason == "size"
+
+
+def test_the_map_so_far_is_there_when_a_process_dies(monkeypatch):
+    monkeypatch.setattr("certifier.jobs.map._run", dying)
+    found = grow_map(planar_arm(2, CROWDED), 1.0, processes=2)
+    assert found.reason == "worker_lost"
+    assert verify_map(found.proof.to_bytes()).cells == found.cells
+
+
+def dying(task):
+    if task.most > 100:
+        os._exit(1)
+    return _adopted[0](task)
+
+
 def test_what_the_verifier_refuses_stays_open():
     """A worker that finds wrong planes costs cells, and nothing wrong is taken."""
     scene = planar_arm(2, CROWDED)
@@ -136,5 +164,5 @@ def test_what_the_verifier_refuses_stays_open():
     assert (len(refused.planes), refused.nodes.tolist()) == (0, [OPEN])
     before = growing.coverage
     growing.take(task, refused)
-    assert growing.coverage == before
+    assert (growing.coverage, growing.refused) == (before, 1)
     assert not growing.trees[task.pairs].weights(np.ones(100000)).any()

@@ -74,6 +74,16 @@ def hand_made(proof: MapProof):
     short = part.planes.copy()
     short[:, 4] *= 0.5
     yield "the normals are longer than they are said to be", tampered(proof, -1, planes=short), "proof_cell"
+    faces = replace(
+        part.ground,
+        C=np.eye(1, part.scene.n),
+        d=np.full(1, -0.9),
+        Y_lower=np.insert(part.ground.Y_lower, 0, 0.0, axis=1),
+        Y_upper=np.insert(part.ground.Y_upper, 0, 0.0, axis=1),
+    )
+    inside = part.interior.copy()
+    inside[0] = -0.95
+    yield "all of it is about a part of the joint space", tampered(proof, -1, ground=faces, interior=inside), "proof_ground"
     narrow = replace(part.ground, half=part.ground.half * 0.99)
     yield "the box is smaller than the joint limits", tampered(proof, -1, ground=narrow), "proof_box"
     yield "the map of one pair is called that of another", replace(proof, pairs=proof.pairs[1:] + proof.pairs[:1]), "proof_scene"
