@@ -50,7 +50,8 @@ class Descent:
 
     def in_order(self) -> tuple[Array, Array, Array]:
         """Returns the tree as a proof has it: nodes, cuts, and the numbers of the planes in their order."""
-        return _preorder(self.kinds, self.values, self.planes, self.children, self.size)
+        nodes, cuts, numbers = preorder(self.kinds, self.values, self.children, self.size, 1)
+        return nodes, cuts, self.planes[numbers[nodes == PLANE]]
 
     def leaves(self, X: Array) -> Array:
         """Returns the numbers of the leaves that points lie in, (N,); a point on a cut is in the lower part.
@@ -104,21 +105,42 @@ def _add(
 
 
 @njit(cache=True)
-def _preorder(kinds: Array, values: Array, planes: Array, children: Array, size: int) -> tuple[Array, Array, Array]:
-    nodes, cuts, held = np.empty(size, np.int8), np.empty(size), np.empty(size, np.int64)
-    waiting = np.zeros(size + 1, np.int64)
-    n, c, p, depth = 0, 0, 0, 1
-    while depth:
-        depth -= 1
-        node = waiting[depth]
-        nodes[n] = kinds[node]
-        n += 1
-        if kinds[node] >= 0:
-            cuts[c] = values[node]
-            c += 1
-            waiting[depth], waiting[depth + 1] = children[node, 1], children[node, 0]
-            depth += 2
-        elif kinds[node] == PLANE:
-            held[p] = planes[node]
-            p += 1
-    return nodes[:n].copy(), cuts[:c].copy(), held[:p].copy()
+def preorder(kinds: Array, values: Array, children: Array, size: int, roots: int) -> tuple[Array, Array, Array]:
+    """Returns the trees of the first nodes, one after the other, as a proof has them: nodes and cuts, and the number of each node.
+
+    Args:
+        size: how many nodes there are.
+    """
+    nodes, cuts, numbers = np.empty(size, np.int8), np.empty(size), np.empty(size, np.int64)
+    waiting, n, c = np.zeros(size + 1, np.int64), 0, 0
+    for root in range(roots):
+        waiting[0], depth = root, 1
+        while depth:
+            depth -= 1
+            node = waiting[depth]
+            nodes[n], numbers[n] = kinds[node], node
+            n += 1
+            if kinds[node] >= 0:
+                cuts[c] = values[node]
+                c += 1
+                waiting[depth], waiting[depth + 1] = children[node, 1], children[node, 0]
+                depth += 2
+    return nodes[:n].copy(), cuts[:c].copy(), numbers[:n].copy()
+
+
+@njit(cache=True)
+def in_order(pieces: Array, ends: Array, which: Array) -> Array:
+    """Returns the pieces of some planes, in this order.
+
+    Args:
+        ends: where the pieces of each plane end; those of the first one begin at 0.
+    """
+    total = 0
+    for i in which:
+        total += ends[i] - (ends[i - 1] if i else 0)
+    found, at = np.empty(total, np.int8), 0
+    for i in which:
+        part = pieces[(ends[i - 1] if i else 0) : ends[i]]
+        found[at : at + len(part)] = part
+        at += len(part)
+    return found

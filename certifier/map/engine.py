@@ -19,14 +19,14 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from certifier.map.settle import CONTACTS, DONE, NARROW, TOUCH, Levels, joint_to_cut, middle, settle, turn
+from certifier.map.settle import CONTACTS, DONE, TOUCH, Levels, joint_to_cut, middle, settle, turn
 from certifier.model import Array
 from certifier.partition.bodies import Pair
 from certifier.partition.hulls import gaps
+from certifier.partition.search import NARROW, NARROW_APART, NARROW_COARSE, NARROW_CUT
 from certifier.partition.sides import Proofs, room_for
 from certifier.proof.partition import OPEN, PLANE
 
-NARROW_COARSE, NARROW_CUT, NARROW_APART = np.radians([15.0, 7.0, 3.5])
 LOOKED_AT, MOSTLY = 16, 0.6
 """A cell goes on to the next level at once where coarse volumes touch at more than MOSTLY of LOOKED_AT samples in it."""
 
@@ -60,7 +60,7 @@ def empty(room: int, k: int) -> Work:
     """Returns room for this many cells of k joints."""
     level, known, begin, end, plane = np.zeros((5, room), np.int64)
     lower, upper = np.empty((2, room, k))
-    kinds, children, contacts = np.full(room, OPEN, np.int16), np.zeros((room, 2), np.int64), np.empty((room, CONTACTS, k))
+    kinds, children, contacts = np.full(room, OPEN, np.int16), np.zeros((room, 2), np.int32), np.empty((room, CONTACTS, k))
     return Work(kinds, np.zeros(room), children, lower, upper, level, contacts, known, begin, end, plane)
 
 
@@ -274,46 +274,3 @@ def _parted(order: Array, samples: Array, begin: int, end: int, joint: int, valu
             order[at] = i
             at += 1
     return below
-
-
-@njit(cache=True)
-def preorder(work: Work, given: int, size: int) -> tuple[Array, Array, Array, Array]:
-    """Returns the trees of the first cells, one after the other: nodes and cuts as a proof has them, open cells, and cells with planes."""
-    nodes, cuts = np.empty(size, np.int8), np.empty(size)
-    opened, settled = np.empty(size, np.int64), np.empty(size, np.int64)
-    waiting = np.empty(size + 1, np.int64)
-    n, c, o, p = 0, 0, 0, 0
-    for root in range(given):
-        waiting[0], depth = root, 1
-        while depth:
-            depth -= 1
-            cell = waiting[depth]
-            kind = work.kinds[cell]
-            nodes[n] = kind
-            n += 1
-            if kind >= 0:
-                cuts[c] = work.values[cell]
-                c += 1
-                waiting[depth], waiting[depth + 1] = work.children[cell, 1], work.children[cell, 0]
-                depth += 2
-            elif kind == PLANE:
-                settled[p] = cell
-                p += 1
-            else:
-                opened[o] = cell
-                o += 1
-    return nodes[:n].copy(), cuts[:c].copy(), opened[:o].copy(), settled[:p].copy()
-
-
-@njit(cache=True)
-def in_order(pieces: Array, bounds: Array, planes_of: Array) -> Array:
-    """Returns the pieces of planes in another order."""
-    total = 0
-    for i in planes_of:
-        total += bounds[i + 1, 0] - bounds[i, 0]
-    found, at = np.empty(total, np.int8), 0
-    for i in planes_of:
-        length = bounds[i + 1, 0] - bounds[i, 0]
-        found[at : at + length] = pieces[bounds[i, 0] : bounds[i + 1, 0]]
-        at += length
-    return found

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from certifier.map.descent import Descent
+from certifier.map.descent import Descent, in_order
 from certifier.map.pair import Found, OpenCells, PairTree
 from certifier.map.trees import Pairs, Plan
 from certifier.model import Array, Scene
@@ -113,10 +113,6 @@ class Tree:
         self.cells = self.cells.some(stay).with_more(found.left)
         self.found.append((found.planes, found.choices, found.pieces, found.lengths))
 
-    def planes(self) -> int:
-        """Returns how many cells have a plane."""
-        return self.descent.held
-
 
 class Growing:
     """A map that grows.
@@ -160,7 +156,7 @@ class Growing:
     @property
     def planes(self) -> int:
         """Returns how many cells are proved."""
-        return sum(tree.planes() for tree in self.trees.values())
+        return sum(tree.descent.held for tree in self.trees.values())
 
     def round(self) -> list[Task]:
         """Returns the tasks of the next round, in an order that is always the same; none where nothing is left to do."""
@@ -200,9 +196,8 @@ class Growing:
         for tree in self.trees.values():
             nodes, cuts, held = tree.descent.in_order()
             planes, choices, pieces, lengths = (np.concatenate(parts) for parts in zip(*tree.found, strict=True))
-            ends = np.cumsum(lengths[:, 0])
-            parts = [pieces[ends[i] - lengths[i, 0] : ends[i]] for i in held.tolist()]
-            maps.append(tree.pair.proof(nodes, cuts, planes[held], choices[held], np.concatenate([pieces[:0], *parts]), lengths[held]))
+            ordered = in_order(pieces, np.cumsum(lengths[:, 0]), held)
+            maps.append(tree.pair.proof(nodes, cuts, planes[held], choices[held], ordered, lengths[held]))
         return MapProof(self._scene, tuple(self.trees), tuple(maps))
 
     def _task(self, name: Pairs, rows: Array, of_samples: Array, water: float) -> Task:

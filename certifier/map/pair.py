@@ -10,6 +10,7 @@ import numpy as np
 from certifier.errors import ProofError
 from certifier.kinematics import Kinematics
 from certifier.map import engine
+from certifier.map.descent import in_order, preorder
 from certifier.map.settle import CONTACTS, LEVELS, Levels
 from certifier.model import Array, Box, Pair, Scene
 from certifier.partition.area import Area
@@ -20,7 +21,7 @@ from certifier.partition.together import volumes_of
 from certifier.partition.tree import ALL
 from certifier.proof.ground import Ground
 from certifier.proof.map import PairMap
-from certifier.proof.partition import OPEN, choices_of
+from certifier.proof.partition import OPEN, PLANE, choices_of
 from certifier.proof.sub_scene import sub_scene
 from certifier.verify.partition import PartitionCheck
 
@@ -56,10 +57,7 @@ class OpenCells(NamedTuple):
 
     def some(self, which: Array) -> OpenCells:
         """Returns some of the cells."""
-        first, last = self.samples[which], self.samples[which + 1]
-        lengths = last - first
-        begin = np.concatenate([[0], np.cumsum(lengths)])
-        places = np.repeat(first - begin[:-1], lengths) + np.arange(begin[-1])
+        begin, places = _ranges(self.samples[which], self.samples[which + 1])
         return self.of([array[which] for array in self[:5]], begin, self.numbers[places])
 
     @classmethod
@@ -72,6 +70,13 @@ class OpenCells(NamedTuple):
         parts = [np.concatenate(both) for both in zip(self[:5], others[:5], strict=True)]
         samples = np.concatenate([self.samples, self.samples[-1] + others.samples[1:]])
         return self.of(parts, samples, np.concatenate([self.numbers, others.numbers]))
+
+
+def _ranges(first: Array, last: Array) -> tuple[Array, Array]:
+    """Returns the numbers from each first one to each last one, which is left out, one range after the other; and where each begins."""
+    lengths = last - first
+    begin = np.concatenate([[0], np.cumsum(lengths)])
+    return begin, np.repeat(first - begin[:-1], lengths) + np.arange(begin[-1])
 
 
 class Found(NamedTuple):
@@ -146,14 +151,12 @@ class PairTree:
         work.begin[:C], work.end[:C] = given.samples[:-1], given.samples[1:]
         order = given.numbers.copy()
         size, looked, kept, pieces = engine.advance(self._pairs, self._levels, work, C, order, samples, weights, most, water)
-        nodes, cuts, opened, settled = engine.preorder(work, C, size)
-        by_place = work.plane[settled]
-        lengths = work.end[opened] - work.begin[opened]
-        begin = np.concatenate([[0], np.cumsum(lengths)])
-        places = np.repeat(work.begin[opened] - begin[:-1], lengths) + np.arange(begin[-1])
+        nodes, cuts, numbers = preorder(work.kinds, work.values, work.children, size, C)
+        opened, by_place = numbers[nodes == OPEN], work.plane[numbers[nodes == PLANE]]
+        begin, places = _ranges(work.begin[opened], work.end[opened])
         of_cells = (work.lower, work.upper, work.level, work.contacts, work.known)
         left = OpenCells.of([array[opened] for array in of_cells], begin, order[places])
-        ordered, lengths = engine.in_order(pieces, kept.bounds, by_place), np.diff(kept.bounds, axis=0)
+        ordered, lengths = in_order(pieces, np.ascontiguousarray(kept.bounds[1:, 0]), by_place), np.diff(kept.bounds, axis=0)
         return Found(looked, nodes, cuts, kept.planes[by_place], kept.choices[by_place], ordered, lengths[by_place], left)
 
     def verified(self, given: OpenCells, found: Found) -> Found:

@@ -12,10 +12,9 @@ from certifier.partition import planes
 from certifier.partition.bodies import CALM, DESCENT, ENOUGH, LEAST, LOOKS, Pair, in_s, prove_both
 from certifier.partition.hulls import gaps
 from certifier.partition.multipliers import PROVED
+from certifier.partition.search import NARROW
 from certifier.partition.sides import Proofs
 
-NARROW = np.radians(3.0)
-"""A cell that turns less than this in every joint stays open."""
 LEVELS = 4
 """A tree has at most this many levels."""
 CONTACTS = 8

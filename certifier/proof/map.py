@@ -89,7 +89,7 @@ class MapProof:
 
 
 def _check_size(scene: Scene, pairs: Sequence[Sequence[Pair]]) -> None:
-    """Refuses a map that names its pairs' geometries so often that it takes long to say what each tree is about."""
+    """Refuses a map whose trees together have too many vertices and joints. Each tree counts those of its own pairs."""
     cost = {geometry.name: len(geometry.vertices) + len(way(scene, geometry.body)) for geometry in scene.geometries}
     if sum(cost[name] for about in pairs for pair in about for name in (pair.a, pair.b)) > limits.CONTAINED:
         raise ProofError("proof_too_large", "the trees of a map are about more vertices and joints than are checked")
