@@ -239,7 +239,8 @@ def _array(name: str, data: bytes) -> np.ndarray:
         raise _malformed("its header is not the one that NumPy writes for such an array", name)
     if math.prod(shape) * dtype.itemsize != len(data) - match.end():
         raise _malformed(f"an array of {dtype} of shape {shape} has not {len(data) - match.end()} bytes", name)
-    array = np.frombuffer(data, dtype, offset=match.end()).reshape(shape)
+    # A copy, because Numba compiles a function again for an array that may not be written to, and that takes a minute.
+    array = np.frombuffer(data, dtype, offset=match.end()).reshape(shape).copy()
     if dtype.kind == "f" and array.size and not (float(array.min()) >= -LARGEST and float(array.max()) <= LARGEST):
         raise _malformed(f"a number is not finite, or larger than {LARGEST:g}", name)
     return array
