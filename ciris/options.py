@@ -84,7 +84,7 @@ class GrowOptions(JobOptions, total=False):
     Default: 1.
     """
     cells: int
-    """Most cells of a pair in each stage. After that, new faces cut off the cells that are still undecided. Default: 6000."""
+    """Most cells of a pair in each stage. After that, new faces cut off the cells that are still undecided. Default: 20000."""
     stages: int
     """Growth ends after this many stages. Each stage gives a larger region than the one before. Default: it ends when a stage gains
     little.
@@ -152,8 +152,8 @@ class CoverOptions(JobOptions, total=False):
     cells: int
     """Most cells of a pair in each stage of a region. After that, new faces cut off the cells that are still undecided. Default: 6000."""
     stages: int
-    """The growth of a region ends after this many stages. One stage gives the first regions sooner, but less coverage in the end.
-    Default: 2 for robots with more than 4 joints; else a region ends when a stage gains little.
+    """The growth of a region ends after this many stages. A further stage makes the region larger. Default: 1 for robots with more than
+    4 joints; else a region ends when a stage gains little.
     """
     random_seed: int
     """Seed of every random choice. Default: 0."""

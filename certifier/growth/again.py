@@ -52,7 +52,7 @@ def begin_again(scene: Scene, state: GrowthState) -> Transition:
     if contact is not None:
         return Transition(state, contact)
     start = Start(polytope, keep[0], keep, again=True)
-    return begin_stage(scene, replace(state, start=start), 1.0, polytope)
+    return begin_stage(scene, replace(state, start=start), polytope)
 
 
 def _contact(scene: Scene, polytope: Polytope, keep: Array) -> Finish | None:

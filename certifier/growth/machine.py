@@ -28,7 +28,7 @@ from certifier.growth.paper.rounds import certify_step
 from certifier.growth.paper.state import PaperState
 from certifier.growth.refusal import ended_by
 from certifier.growth.state import Best, GrowthState, Start
-from certifier.growth.whole import SLICE, after_cells, begin_whole, keeps_more
+from certifier.growth.whole import SLICE, after_cells, begin_stage, keeps_more
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
@@ -135,7 +135,7 @@ def _proposed(scene: Scene, state: GrowthState, proposal: Proposal) -> Transitio
     start = Start(rows, proposal.center, keep, _hindrance(state, proposal))
     if isinstance(state, PaperState):
         return papers.begin(scene, replace(state, start=start), start, proposal.info.get("method"))
-    return begin_whole(scene, replace(state, start=start), start)
+    return begin_stage(scene, replace(state, start=start), rows)
 
 
 def _certified(scene: Scene, state: GrowthState, report: Outcomes) -> Transition:

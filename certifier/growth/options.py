@@ -10,7 +10,7 @@ from certifier.growth.paper.options import PaperOptions
 from certifier.options import option, read
 from certifier.seeding.options import OF_PAPER
 
-MOST_CELLS = 6000
+MOST_CELLS = 20_000
 MOST_GIVEN = 10_000_000
 """Nobody may ask for more cells of a pair."""
 

@@ -53,8 +53,6 @@ class Whole:
     """Holds the progress of certifying the whole proposal.
 
     Attributes:
-        reach: the faces of the region before were moved out to this many times their distance from the seed. In the first stage these are
-            the proposal's faces, and reach is at most 1 (certifier.growth.whole).
         kept: the share of the proposal that the best region kept when this stage began.
         polytope: what the cuts so far keep; faces are added before the joint limits, which are its last 2n rows, and none is dropped.
         mid, half, Y_lower, Y_upper: of the :class:`ProvedBox` that is the root cell of all partitions of this stage.
@@ -68,7 +66,6 @@ class Whole:
         together: pair index -> the other pairs that share its certificate.
     """
 
-    reach: float
     kept: float
     polytope: Polytope
     mid: Array

@@ -4,9 +4,8 @@ One round looks at a fixed number of cells of every pair that is not certified y
 close. What is proved stays proved, because the polytope only shrinks. The rounds go on until every pair is certified. When the effort is
 spent, all cells that are still open are cut off as well.
 
-The first region comes from a smaller copy of the proposal about the seed, so there is a certified region early. In every further stage
-the faces of the region move out, as far as the proposal, and what is between is certified in the same way. The faces that were found
-where cells are cheap show where the next faces have to be. This takes a fraction of the cells that the proposal itself would take.
+The first stage certifies the proposal itself. Where it keeps little, there are further stages: the faces of the region move out, as far as
+the proposal, and what is between is certified in the same way.
 """
 
 from __future__ import annotations
@@ -27,12 +26,15 @@ from certifier.polytopes.cutting import BARELY, Cut, cut, lost_together, samples
 from certifier.polytopes.proved import ProvedBox
 from certifier.polytopes.pushed import pushed
 
-FIRST = 0.7
-"""In the first stage the faces of the proposal lie this part of their distance from the seed."""
-FARTHEST, FARTHER, FAR = 1.45, 1.25, 1.2
-"""The faces of the region of the first stage move out to FARTHEST times their distance from the seed, and those of others to FAR times."""
-SOON = 0.25
-"""When more than this share of the job's time has passed after the first stage, its faces move out to FARTHER times only."""
+FAR = 1.2
+"""In every further stage, the faces of the region move out to this many times their distance from the seed."""
+SMALLER = 0.7
+"""Where something would have to be cut off that no face separates from a point to keep, the stage begins anew with a smaller copy of the
+polytope: its faces at this part of their distance from the seed."""
+LEAST = 0.01
+"""A copy that keeps less than this share of the proposal is not tried."""
+ENOUGH = 0.95
+"""Growth ends with a region that keeps this share of the proposal: a further stage takes as long as the one before, and gains little."""
 GAIN = 0.02
 """Growth ends with a stage that gains less than this share of the proposal."""
 SLICE = 100
@@ -46,35 +48,28 @@ VERIFIED = 5 * SLICE
 HARD = 6 * SLICE
 """After this many cells of a pair, its open cells are cut off where the bodies are near, not only contacts. Where faces separate volumes
 that fewer joints move (certifier.partition.search), cells are cut off from the first round on."""
-LOSS, PATIENCE = 0.002, 36 * SLICE
+LOSS, PATIENCE = 0.002, 108 * SLICE
 """While open cells of a pair are cut off, its faces lose at most the share LOSS of the polytope in a round. The share doubles after every
 PATIENCE cells of a hard pair."""
 FAST_LOSS = 0.05
-"""They lose at most this share before that, in the first stage, and when the pair's effort is spent. From then on, the share doubles after
+"""They lose at most this share before that, and when the pair's effort is spent. From then on, the share doubles after
 every PIECES slices."""
 CONTACT_LOSS = 0.01
-"""Contacts have to be cut off sooner or later. For them, faces may always lose this share where that is needed."""
+"""Contacts have to be cut off sooner or later, and no cell settles them. For them, faces may always lose this share where that is needed,
+and twice as much after every PIECES slices."""
 ENDING = 60 * SLICE
 """When the effort is spent, open cells are cut off where coarse volumes touch; after this many more cells, wherever they are."""
-LATE = 0.5
+LATE = 0.6
 """When this share of a stage's time until the deadline has passed, its effort counts as spent, so that there is still time for a region."""
 LATE_LOSS, LATER = 0.01, 0.05
 """From then on, faces for a pair lose at most LATE_LOSS of the polytope in a round. The share doubles whenever LATER more of the time has
 passed, so that the rounds end before the deadline, however long they take."""
-LATEST = 0.65
+LATEST = 0.75
 """When this share has passed, all open cells are cut off, not only those where coarse volumes touch."""
 REVOKED = "revoked: "
 """The reason begins like this where nothing is left of a region that is certified again."""
-EARLY_EFFORT = 24 * SLICE
-"""The effort of the first two stages, so that the first regions come soon, and where a region is certified again."""
-
-
-def begin_whole(scene: Scene, state: GrowthState, start: Start) -> Transition:
-    """Asks to certify a smaller copy of the proposal, or all of it where the copy does not contain all points to keep."""
-    copy = _copy(scene, start, FIRST)
-    if (start.keep @ copy.C.T < copy.d).all():
-        return begin_stage(scene, state, FIRST, copy)
-    return begin_stage(scene, state, 1.0, _copy(scene, start, 1.0))
+AGAIN_EFFORT = 24 * SLICE
+"""The effort where a region is certified again."""
 
 
 def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
@@ -85,19 +80,16 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
     kept = _kept(scene, start, best.polytope)
     if start.again:
         return Transition(state, Finish(Outcome.CERTIFIED, f"certified; {100 * kept:.3g} % of the region is kept"))
-    if kept == 1 or whole.stage == state.options.stages or (whole.reach > 1 and kept < whole.kept + GAIN):
+    if kept >= ENOUGH or whole.stage == state.options.stages or (whole.stage > 1 and kept < whole.kept + GAIN):
         return Transition(state, Finish(Outcome.CERTIFIED, "certified"))
-    reach = FAR if whole.reach >= 1 else FARTHEST if whole.passed <= SOON else FARTHER
-    return begin_stage(scene, state, reach, pushed(best.polytope, start.seed, reach, start.rows), kept, whole.passed, whole.stage + 1)
+    return begin_stage(scene, state, pushed(best.polytope, start.seed, FAR, start.rows), kept, whole.passed, whole.stage + 1)
 
 
-def begin_stage(
-    scene: Scene, state: GrowthState, reach: float, polytope: Polytope, kept: float = 0.0, passed: float = 0.0, stage: int = 1
-) -> Transition:
+def begin_stage(scene: Scene, state: GrowthState, polytope: Polytope, kept: float = 0.0, passed: float = 0.0, stage: int = 1) -> Transition:
     """Asks to certify all pairs on a polytope; what was proved in the stage before does not carry over to it."""
     box = ProvedBox.of_program(scene, polytope)
     grouped = _together(scene, state, polytope)
-    begun = Whole(reach, kept, polytope, **vars(box), since=passed, passed=passed, stage=stage, together=grouped)
+    begun = Whole(kept, polytope, **vars(box), since=passed, passed=passed, stage=stage, together=grouped)
     return _next(scene, replace(state, whole=begun))
 
 
@@ -106,14 +98,16 @@ def in_words(scene: Scene, s: Array) -> str:
     return f"q = ({', '.join(f'{x:.4g}' for x in scene.to_q(s))})"
 
 
-def _copy(scene: Scene, start: Start, scale: float) -> Polytope:
-    """Returns the proposal with its faces at this part of their distance from the seed."""
-    return pushed(start.rows, start.seed, scale, scene.polytope([], []))
-
-
 def _kept(scene: Scene, start: Start, polytope: Polytope) -> float:
     """Returns the share of the proposal's q-volume that a polytope keeps."""
     return float(polytope.contains(samples_of(scene, start.rows)).mean())
+
+
+def _worth_a_stage(scene: Scene, state: GrowthState, start: Start, polytope: Polytope) -> bool:
+    """Returns whether a copy has all points to keep inside, and keeps more of the proposal than LEAST and the best region."""
+    if start.again or not (start.keep @ polytope.C.T < polytope.d).all():
+        return False
+    return _kept(scene, start, polytope) > max(LEAST, _kept(scene, start, state.best.polytope) if state.best else 0)
 
 
 def keeps_more(scene: Scene, start: Start, polytope: Polytope, other: Polytope) -> bool:
@@ -154,6 +148,9 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
         pair = scene.pairs[failing[0]]
         return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing more could be cut off for them")
     if smaller is None:
+        copy = pushed(whole.polytope, start.seed, SMALLER, scene.polytope([], []))
+        if _worth_a_stage(scene, state, start, copy):
+            return begin_stage(scene, state, copy, whole.kept, whole.passed, whole.stage)
         pair = scene.pairs[failing[0]]
         reason = f"{pair.a} and {pair.b} touch, or come too close, at or between configurations that have to stay inside"
         return _ended(state, report, reason)
@@ -210,9 +207,9 @@ def _cut_off(
     for i in failing:
         weakness, joints, most = report.weaknesses[i], joints_between(scene, i), _most_loss(state, whole, i, report)
         points, k = weakness.points, weakness.contacts
-        corners += [(joints, points[:k], max(most, CONTACT_LOSS)), (weakness.joints or joints, points[k:], most)]
-    around = start.rows if whole.reach >= 1 else _copy(scene, start, whole.reach)
-    return cut(scene, whole.polytope, start.keep, corners, around, beyond)
+        of_contacts = min(CONTACT_LOSS * 2.0 ** (whole.spent[i] // (PIECES * SLICE)), 1.0)
+        corners += [(joints, points[:k], max(most, of_contacts)), (weakness.joints or joints, points[k:], most)]
+    return cut(scene, whole.polytope, start.keep, corners, start.rows, beyond)
 
 
 def _obstacles(stage: int, failing: Sequence[int], cut: Cut) -> dict[int, Obstacle]:
@@ -232,7 +229,7 @@ def _most_loss(state: GrowthState, whole: Whole, pair: int, report: Outcomes) ->
     if _gone(whole) >= LATE:
         return float(min(LATE_LOSS * 2.0 ** ((_gone(whole) - LATE) / LATER), 1.0))
     effort, spent = _effort(state, whole, pair), whole.spent[pair]
-    if whole.reach >= 1 and hard < spent < effort:
+    if hard < spent < effort:
         return float(LOSS * 2.0 ** (max(spent - HARD, 0) // PATIENCE))
     return float(min(FAST_LOSS * 2.0 ** max((spent - effort) // (PIECES * SLICE), 0), 1.0))
 
@@ -240,9 +237,9 @@ def _most_loss(state: GrowthState, whole: Whole, pair: int, report: Outcomes) ->
 def _effort(state: GrowthState, whole: Whole, pair: int) -> int:
     """Returns how many cells of a pair are looked at before its open cells are cut off."""
     effort = state.options.cells or MOST_CELLS
-    soon = whole.reach < 1 or whole.reach > FAR or _again(state)
-    early = EARLY_EFFORT if soon else effort
-    return min(effort, early, whole.spent.get(pair, 0) if _gone(whole) >= LATE else effort)
+    if _again(state):
+        effort = min(effort, AGAIN_EFFORT)
+    return min(effort, whole.spent.get(pair, 0)) if _gone(whole) >= LATE else effort
 
 
 def _again(state: GrowthState) -> bool:

@@ -13,8 +13,8 @@ Q = tuple[float, ...]
 MOST_GIVEN = 1000
 """Number of configurations that may be given in each of the lists."""
 MOST_JOINTS = 4
-STAGES = 2
-"""For robots with more joints than that a region ends after this many stages, unless somebody asks for more."""
+STAGES = 1
+"""For robots with more joints than that, a region ends after this many stages, unless somebody asks for more."""
 ENOUGH = 0.95
 """The coverage that is asked for where nothing else is."""
 
@@ -59,7 +59,7 @@ class CoverOptions:
     )
     stages: int | None = option(
         None,
-        "The growth of a region ends after this many stages. One stage gives the first regions sooner, but less coverage in the end.",
+        "The growth of a region ends after this many stages. A further stage makes the region larger.",
         otherwise=f"{STAGES} for robots with more than {MOST_JOINTS} joints; else a region ends when a stage gains little",
         least=1,
         greatest=100,

@@ -43,7 +43,7 @@ def test_a_cover_is_a_job_with_options_of_its_own(client: TestClient, scene: Sce
     assert (job["kind"], job["state"], job["parent"]) == ("cover", "queued", None)
 
 
-@pytest.mark.parametrize(("links", "stages"), [(4, None), (5, 2)])
+@pytest.mark.parametrize(("links", "stages"), [(4, None), (5, 1)])
 def test_the_regions_of_robots_with_many_joints_end_with_their_first_stage(
     client: TestClient, database: Database, links: int, stages: int | None
 ) -> None:

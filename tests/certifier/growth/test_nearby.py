@@ -13,7 +13,6 @@ from certifier.growth.actions import Certify, Failed, Finish, Outcomes, Propose
 from certifier.growth.machine import NEARBY, advance, begin
 from certifier.growth.nearby import LEAST, PART, nearby
 from certifier.growth.options import GrowthOptions
-from certifier.growth.whole import FIRST
 from certifier.jobs.local import grow
 from certifier.model import WORLD, JointKind, Pair, Volume
 from certifier.outcome import Outcome
@@ -119,7 +118,7 @@ def test_growth_certifies_the_box_and_then_the_proposal():
     proposal = Proposal(C=C, d=np.full(4, 0.3), center=np.zeros(2), contain=np.zeros((0, 2)), info={})
     second = advance(NEAR, first.state, proposal)
     assert second.action.iteration == 1
-    assert second.action.polytope.d[0] == pytest.approx(FIRST * 0.3)
+    assert second.action.polytope.d[0] == pytest.approx(0.3)
     last = advance(NEAR, second.state, all_certified(second.action))
     assert last.candidate.polytope is second.action.polytope
     assert last.action == Finish(Outcome.CERTIFIED, "certified")

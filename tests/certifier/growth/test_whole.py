@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,7 +21,7 @@ from certifier.growth.actions import Certify, Finish, Outcomes, Propose
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import GrowthState, Whole
-from certifier.growth.whole import FAR, FARTHER, FIRST, GAIN, HARD, LATE, LATEST, PARTS, PIECES, SLICE, SOON, VERIFIED
+from certifier.growth.whole import FAR, GAIN, HARD, LATE, LATEST, LEAST, PARTS, PIECES, SLICE, SMALLER, VERIFIED
 from certifier.jobs import local
 from certifier.jobs.local import grow
 from certifier.model import WORLD, Polytope
@@ -92,18 +93,23 @@ def stages(made):
     return [made[i:j] for i, j in zip(begins, [*begins[1:], len(made)], strict=True)]
 
 
+@pytest.fixture
+def demanding(monkeypatch):
+    """Growth goes on until a stage gains little, however much the region keeps."""
+    monkeypatch.setattr(whole, "ENOUGH", 1.0)
+
+
 def weak(points):
     return Weakness(np.asarray(points, dtype=float).reshape(-1, 2), np.zeros(2))
 
 
-def test_a_proposal_that_certifies_is_kept_whole_after_a_smaller_copy_of_it():
-    made, accepted, end = drive(lambda i, action: (Outcome.CERTIFIED, None), options())
-    assert [action.polytope.d[:4].tolist() for action in made] == [[scale] * 4 for scale in (FIRST, 1.0)]
-    assert [action.label for action in made] == ["cells"] * 2
-    assert [(action.box.mid - action.box.half < -scale).all() for action, scale in zip(made, (FIRST, 1.0), strict=True)] == [True, True]
-    assert accepted[-1].polytope.d[:4].tolist() == [1.0] * 4
-    assert accepted[-1].proofs == {0: 1, 1: 1}
-    assert end.outcome is Outcome.CERTIFIED
+def test_a_proposal_that_certifies_is_kept_whole():
+    (made,), (accepted,), end = drive(lambda i, action: (Outcome.CERTIFIED, None), options())
+    assert made.polytope.d[:4].tolist() == accepted.polytope.d[:4].tolist() == [1.0] * 4
+    assert made.label == "cells"
+    assert (made.box.mid - made.box.half < -1.0).all()
+    assert accepted.proofs == {0: 0, 1: 0}
+    assert (end.outcome, end.reason) == (Outcome.CERTIFIED, "certified")
 
 
 def test_where_bodies_touch_is_cut_off_and_what_holds_is_not_asked_for_again():
@@ -114,17 +120,16 @@ def test_where_bodies_touch_is_cut_off_and_what_holds_is_not_asked_for_again():
         return Outcome.CERTIFIED, None
 
     made, accepted, end = drive(verdict, options())
-    small, (first, last), *others = stages(made)
-    assert len(small) == len(others) == 1, "one more stage sees that there is little to gain"
+    ((first, last),) = stages(made)
     assert [action.pairs for action in (first, last)] == [[0, 1], [1]]
-    assert last.reuse == {0: 1}
-    assert last.begun == {0: 1, 1: 1}
+    assert last.reuse == {0: 0}
+    assert last.begun == {0: 0, 1: 0}
     assert last.box.mid.tolist() == first.box.mid.tolist()
     assert last.box.half.tolist() == first.box.half.tolist()
     assert not last.polytope.contains(CORNER).any()
     assert last.polytope.contains(np.array([[0.0, 0.0], [0.2, 0.0]])).all()
     assert (last.polytope.C[:4] == first.polytope.C[:4]).all()
-    assert accepted[1].proofs == {0: 1, 1: 2}
+    assert accepted[0].proofs == {0: 0, 1: 1}
     assert end.outcome is Outcome.CERTIFIED
 
 
@@ -138,41 +143,40 @@ def test_a_contact_on_a_face_does_not_end_growth():
         return Outcome.CERTIFIED, None
 
     made, accepted, end = drive(verdict, options(), limit=200)
-    assert (stages(made)[1][0].polytope.C @ contact[0] == stages(made)[1][0].polytope.d).any()
-    assert len(accepted) > 1
+    assert (made[0].polytope.C @ contact[0] == made[0].polytope.d).any()
     assert not accepted[-1].polytope.contains(contact, 1e-4).any()
     assert end.reason == "certified"
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_growth_ends_after_so_many_stages(count):
+def test_growth_ends_after_so_many_stages(count, demanding):
     corner = np.array([[0.4, 0.8], [0.8, 0.4]])
 
     def verdict(index, action):
-        return (Outcome.REFUTED, weak(corner)) if (index, action.iteration) == (1, 1) else (Outcome.CERTIFIED, None)
+        return (Outcome.REFUTED, weak(corner)) if (index, action.iteration) == (1, 0) else (Outcome.CERTIFIED, None)
 
     made, accepted, end = drive(verdict, options(stages=count))
     assert len(stages(made)) == len(accepted) == count
     assert (end.outcome, end.reason) == (Outcome.CERTIFIED, "certified")
 
 
-def test_faces_move_out_stage_by_stage_as_far_as_the_proposal():
-    """A face in the second stage cuts off much too much; the stages after it win that back."""
+def test_faces_move_out_stage_by_stage_as_far_as_the_proposal(demanding):
+    """A face in the first stage cuts off much too much; the stages after it win that back."""
     corner = np.array([[0.4, 0.8], [0.8, 0.4]])
 
     def verdict(index, action):
-        return (Outcome.REFUTED, weak(corner)) if (index, action.iteration) == (1, 1) else (Outcome.CERTIFIED, None)
+        return (Outcome.REFUTED, weak(corner)) if (index, action.iteration) == (1, 0) else (Outcome.CERTIFIED, None)
 
     made, accepted, end = drive(verdict, options())
-    assert [len(stage) for stage in stages(made)] == [1, 2, 1, 1]
-    cut, wider, widest = (candidate.polytope for candidate in accepted[1:])
+    assert [len(stage) for stage in stages(made)] == [2, 1, 1]
+    cut, wider, widest = (candidate.polytope for candidate in accepted)
     (face,) = (i for i, row in enumerate(cut.C) if (row != 0).all())
     (moved,) = (i for i, row in enumerate(wider.C) if (row != 0).all())
     assert wider.C[moved].tolist() == cut.C[face].tolist()
     assert wider.d[moved] == pytest.approx(FAR * cut.d[face])
     samples = uniform_in_q(Polytope(PROPOSAL.C, PROPOSAL.d), SCENE, 100, 10, 0).reshape(-1, 2)
     shares = [candidate.polytope.contains(samples).mean() for candidate in accepted]
-    assert shares[0] + GAIN < shares[1] < shares[2] - GAIN < shares[3] == 1.0, "the third stage gained enough for a fourth one"
+    assert shares[0] + GAIN < shares[1] < shares[2] == 1.0, "the second stage gained enough for a third one"
     assert (widest.C != 0).all(axis=1).sum() == 0
     assert end.reason == "certified"
 
@@ -186,7 +190,7 @@ def test_what_stays_open_is_cut_off_when_the_effort_is_spent_and_where_bodies_ar
         return Outcome.INCONCLUSIVE, weak(CORNER[there] if index in action.ending else [])
 
     made, accepted, _ = drive(verdict, options(cells=slices * SLICE))
-    later = stages(made)[1]
+    later = stages(made)[0]
     spent = [round_ * PARTS for round_ in range(len(later))]
     assert [action.hard for action in later] == [[1] if HARD <= SLICE * s < SLICE * slices else [] for s in spent]
     assert [action.ending for action in later] == [[1] if s >= slices else [] for s in spent]
@@ -198,18 +202,10 @@ def test_what_stays_open_is_cut_off_when_the_effort_is_spent_and_where_bodies_ar
     assert not accepted[-1].polytope.contains(CORNER).any()
 
 
-@pytest.mark.parametrize(("gone", "reach"), [(0.0, 1.0), (SOON, 1.0), (SOON + 0.01, FARTHER * FIRST)])
-def test_after_a_slow_first_stage_the_faces_move_out_less(gone, reach):
-    made, _, _ = drive(lambda i, action: (Outcome.CERTIFIED, None), options(), passed=lambda action: gone)
-    assert made[1].polytope.d[:4].tolist() == pytest.approx([reach] * 4)
-
-
 @pytest.mark.parametrize(("passed", "parts"), [(0.0, PARTS), (LATE, 1)])
 def test_rounds_of_many_pairs_are_shorter_when_a_stage_is_late(passed, parts):
     pairs = range(2 * PIECES)
-    state = Whole(
-        1.2, 0.5, SCENE.polytope([], []), *np.zeros((2, 2)), *np.zeros((2, 2, 8)), open_cells=dict.fromkeys(pairs, 50), passed=passed
-    )
+    state = Whole(0.5, SCENE.polytope([], []), *np.zeros((2, 2)), *np.zeros((2, 2, 8)), open_cells=dict.fromkeys(pairs, 50), passed=passed)
     assert whole._parts(pairs, state) == (dict.fromkeys(pairs, parts) if parts > 1 else {})
 
 
@@ -228,7 +224,7 @@ def test_rounds_of_many_pairs_are_shorter_when_a_stage_is_late(passed, parts):
 def test_contacts_are_costly_where_faces_lose_much_or_there_are_none(lost, cut, passed, costly):
     polytope = SCENE.polytope([], [])
     smaller = {"off": SCENE.polytope([[1.0, 0.0]], [0.5]), "not": polytope, "impossible": None}[cut]
-    state = Whole(1.2, 0.5, polytope, *np.zeros((2, 2)), *np.zeros((2, 2, 8)), passed=passed)
+    state = Whole(0.5, polytope, *np.zeros((2, 2)), *np.zeros((2, 2, 8)), passed=passed)
     report = SimpleNamespace(weaknesses={3: Weakness(CORNER, np.zeros(2), contacts=len(CORNER))})
     made = Cut(smaller, [Made(int(lost > 0), lost), Made()], polytope)
     assert whole._costly(state, report, [3], made) == ([3] if costly else [])
@@ -238,7 +234,7 @@ def test_contacts_are_costly_where_faces_lose_much_or_there_are_none(lost, cut, 
 
 @pytest.mark.parametrize(("touching", "when"), [(True, LATE), (False, LATEST)])
 def test_what_is_open_is_cut_off_when_the_deadline_comes_near(touching, when):
-    """The second stage goes on until it is late, and ends a few rounds later: where coarse volumes touch at once, elsewhere at last."""
+    """A stage goes on until it is late, and ends a few rounds later: where coarse volumes touch at once, elsewhere at last."""
 
     def verdict(index, action):
         there = action.polytope.contains(CORNER)
@@ -248,14 +244,14 @@ def test_what_is_open_is_cut_off_when_the_deadline_comes_near(touching, when):
         return Outcome.INCONCLUSIVE, weak(CORNER[there] if named else [])
 
     made, accepted, end = drive(verdict, options(cells=1000 * SLICE), passed=lambda action: 0.1 * action.iteration)
-    second = stages(made)[1]
+    second = stages(made)[0]
     passed = [0.1 * (action.iteration - 1) for action in second]
     assert [bool(action.ending) for action in second] == [share >= LATE for share in passed]
     assert [bool({*action.hard} & {*action.ending}) for action in second] == [share >= LATEST for share in passed]
     assert all(action.polytope.contains(CORNER).all() for action, share in zip(second, passed, strict=True) if share < when)
     assert when < passed[-1] < when + 0.25
     assert end.outcome is Outcome.CERTIFIED
-    assert not accepted[1].polytope.contains(CORNER).any()
+    assert not accepted[0].polytope.contains(CORNER).any()
 
 
 def test_open_cells_are_dealt_to_parts_and_a_pair_without_any_is_put_together_in_the_next_round():
@@ -285,39 +281,59 @@ def test_open_cells_are_dealt_to_parts_and_a_pair_without_any_is_put_together_in
     assert [action.parts.get(1, 1) for action in made] == [1, shared, shared, PIECES, min(PIECES, (PARTS + 24) * SLICE // VERIFIED)]
     assert made[-1].reuse == {0: 2}
     assert made[-1].work == [(1, part) for part in range(made[-1].parts[1])]
-    assert isinstance(transition.action, Certify)
-    assert (transition.state.best.iteration, transition.action.begun) == (4, {})
+    assert transition.action == Finish(Outcome.CERTIFIED, "certified")
+    assert transition.state.best.iteration == 4
 
 
 def test_a_contact_at_a_configuration_to_keep_ends_without_a_region():
+    """Smaller copies are tried, as long as they keep something."""
     made, accepted, end = drive(lambda i, action: (Outcome.REFUTED, weak([[0.1, 0.0]])), options())
-    assert len(made) == 1
+    scales = SMALLER ** np.arange(len(made))
+    assert [action.polytope.d[0] for action in made] == pytest.approx(scales.tolist())
+    assert scales[-1] ** 2 > LEAST > (SMALLER * scales[-1]) ** 2 or SMALLER * scales[-1] < 0.2, "the copy has all points to keep inside"
     assert not accepted
     assert end.outcome is Outcome.REFUTED
     assert SCENE.pairs[0].a in end.reason
 
 
-def test_a_contact_at_a_configuration_to_keep_leaves_the_smaller_region():
-    def verdict(index, action):
-        return (Outcome.CERTIFIED, None) if action.iteration == 0 else (Outcome.REFUTED, weak([[0.1, 0.0]]))
+def test_where_nothing_can_be_cut_off_a_smaller_copy_is_tried():
+    """A point between those to keep fails, but not in a polytope that is small enough."""
 
-    _, accepted, end = drive(verdict, options())
-    assert [candidate.iteration for candidate in accepted] == [0]
+    def verdict(index, action):
+        return (Outcome.CERTIFIED, None) if action.polytope.d[0] < 0.6 else (Outcome.TOO_CLOSE, weak([[0.1, 0.0]]))
+
+    made, accepted, end = drive(verdict, options(stages=1))
+    assert [action.polytope.d[0] for action in made] == pytest.approx([1.0, SMALLER, SMALLER**2])
+    assert accepted[-1].polytope is made[-1].polytope
+    assert (end.outcome, end.reason) == (Outcome.CERTIFIED, "certified")
+
+
+def in_the_second_stage(found):
+    """Returns verdicts: the first stage cuts a corner off, and then pair 1 has this one."""
+    corner = np.array([[0.4, 0.8], [0.8, 0.4]])
+
+    def verdict(index, action):
+        if index == 0 or action.iteration == 1:
+            return Outcome.CERTIFIED, None
+        return (Outcome.REFUTED, weak(corner)) if action.iteration == 0 else found
+
+    return verdict
+
+
+def test_a_contact_at_a_configuration_to_keep_leaves_the_smaller_region(demanding):
+    _, accepted, end = drive(in_the_second_stage((Outcome.REFUTED, weak([[0.1, 0.0]]))), options())
+    assert [candidate.iteration for candidate in accepted] == [1]
     assert end.outcome is Outcome.CERTIFIED
     assert "ended early" in end.reason
 
 
-@pytest.mark.parametrize("after", [0, 1])
-def test_a_pair_that_fails_nobody_knows_where_ends_the_growth(after):
+def test_a_pair_that_fails_nobody_knows_where_ends_the_growth(demanding):
     """An error, or a proof that does not hold, would come again and again."""
-
-    def verdict(index, action):
-        return (Outcome.ERROR, None) if index == 1 and action.iteration >= after else (Outcome.CERTIFIED, None)
-
-    made, accepted, end = drive(verdict, options())
-    assert len(made) == after + 1
-    assert len(accepted) == after
-    assert end.outcome is (Outcome.CERTIFIED if after else Outcome.ERROR)
+    made, accepted, end = drive(lambda index, action: (Outcome.ERROR if index == 1 else Outcome.CERTIFIED, None), options())
+    assert (len(made), len(accepted), end.outcome) == (1, 0, Outcome.ERROR)
+    assert SCENE.pairs[1].a in end.reason
+    made, accepted, end = drive(in_the_second_stage((Outcome.ERROR, None)), options())
+    assert (len(made), len(accepted), end.outcome) == (3, 1, Outcome.CERTIFIED)
     assert SCENE.pairs[1].a in end.reason
 
 
@@ -389,19 +405,21 @@ def test_a_region_of_an_example_is_verified_contains_what_it_has_to_and_is_free(
 
 
 @cache
-def three_stages():
-    """Returns a scene, options, and the region that they give. The region grows in three stages."""
+def two_stages():
+    """Returns a scene, options, and the region that they give. The region grows in two stages."""
     _, scene, q = example("planar_2dof")
     asked = GrowthOptions(seed=box_seed(scene.to_s(q), 0.22), cells=SLICE)
-    region = grow(scene, asked)
-    assert len(region.manifest["provenance"]["growth_curve"]) == 3
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(whole, "ENOUGH", 1.0)
+        region = grow(scene, asked)
+    assert len(region.manifest["provenance"]["growth_curve"]) == 2
     assert region.manifest["share"]["collision_free"] < 1, "something had to be cut off"
     return scene, asked, region
 
 
 @pytest.mark.parametrize("processes", [1, 2, pytest.param(3, marks=pytest.mark.slow)])
-def test_the_same_job_comes_to_the_same_bytes(processes):
-    scene, asked, first = three_stages()
+def test_the_same_job_comes_to_the_same_bytes(processes, demanding):
+    scene, asked, first = two_stages()
     second = grow(scene, asked, processes=processes)
     assert first.proof == second.proof
     assert first.manifest["halfspace_offsets"] == second.manifest["halfspace_offsets"]
@@ -416,8 +434,8 @@ def test_more_effort_does_not_come_to_less():
     assert 0.9 < shares[0]["value"] <= shares[1]["value"]
 
 
-def test_a_deadline_ends_growth_with_the_best_region_so_far(monkeypatch):
-    scene, asked, _ = three_stages()
+def test_a_deadline_ends_growth_with_the_best_region_so_far(monkeypatch, demanding):
+    scene, asked, _ = two_stages()
     # The clock stands still until a region is reported, and then the deadline is over.
     clock = [0.0]
     monkeypatch.setattr(local, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
@@ -439,15 +457,20 @@ def test_a_deadline_ends_growth_with_the_best_region_so_far(monkeypatch):
     assert (refused.value.code, refused.value.hint) == ("not_grown", "allow more time")
 
 
-def test_regions_are_delivered_as_they_are_certified_and_time_is_left_for_growing(monkeypatch):
-    scene, asked, _ = three_stages()
+def test_regions_are_delivered_as_they_are_certified_and_time_is_left_for_growing(monkeypatch, demanding):
+    scene, asked, _ = two_stages()
+    # Faces that move out by little make three stages, of which the last one gains nothing.
+    monkeypatch.setattr(whole, "FAR", 1.002)
+    monkeypatch.setattr(whole, "GAIN", 0.0)
+    asked = replace(asked, stages=3)
     monkeypatch.setattr(local, "REST", 0.0)
     delivered = []
     last = grow(scene, asked, deliver=delivered.append)
-    assert len(delivered) == len(last.manifest["provenance"]["growth_curve"]) - 1 == 2
+    assert len(delivered) == len(last.manifest["provenance"]["growth_curve"]) == 2
     for region in delivered:
         assert verify_region(region.proof).faces == len(region.manifest["halfspace_offsets"])
-        assert region.manifest["share"]["value"] < last.manifest["share"]["value"]
+    first, second = (region.manifest["share"]["value"] for region in delivered)
+    assert first < second == last.manifest["share"]["value"]
     # Verifying takes no time here, but rests for ever after the first.
     monkeypatch.setattr(local, "REST", 1e9)
     few = []
@@ -461,8 +484,8 @@ def test_a_seed_in_contact_is_refused():
         grow(scene, GrowthOptions(seed={"q": [0.0, 0.0]}))
 
 
-def test_a_child_that_dies_leaves_the_region_before(monkeypatch):
-    _, scene, q = example("planar_2dof")
+def test_a_child_that_dies_leaves_the_region_before(monkeypatch, demanding):
+    scene, asked, _ = two_stages()
     certifier = local.part_certifier
 
     def dying(scene, action, *others):
@@ -470,7 +493,7 @@ def test_a_child_that_dies_leaves_the_region_before(monkeypatch):
         return (lambda index, part: os._exit(1)) if in_the_second_stage else certifier(scene, action, *others)
 
     monkeypatch.setattr(local, "part_certifier", dying)
-    region = grow(scene, GrowthOptions(seed={"q": q}), processes=2)
+    region = grow(scene, asked, processes=2)
     assert "a process that certified pairs died" in region.reason
     assert 0 < region.manifest["share"]["value"] < 1
     verify_region(region.proof)

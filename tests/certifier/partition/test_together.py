@@ -131,7 +131,7 @@ def test_a_group_is_divided_although_faces_for_another_one_cut_its_contacts_off(
     monkeypatch.setattr(whole, "together", lambda *_: groups)
     monkeypatch.setattr(whole, "divided", lambda *_: {})
     start = Start(scene.polytope(np.concatenate([np.eye(2), -np.eye(2)]), [1.0] * 4), KEEP[0], KEEP)
-    begun = whole.begin_whole(scene, replace(begin(scene, GrowthOptions(seed={})).state, start=start), start)
+    begun = whole.begin_stage(scene, replace(begin(scene, GrowthOptions(seed={})).state, start=start), start.rows)
     touching = Outcome.INCONCLUSIVE, Weakness(contacts, np.zeros(2), contacts=len(contacts)), 1
     reached = [(i, *(touching if i in groups else (Outcome.CERTIFIED, None, None))) for i, _ in begun.action.work]
     following = whole.after_cells(scene, begun.state, start, Outcomes.of_parts(begun.action, reached))
