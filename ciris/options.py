@@ -86,8 +86,8 @@ class GrowOptions(JobOptions, total=False):
     cells: int
     """Most cells of a pair in each stage. After that, new faces cut off the cells that are still undecided. Default: 20000."""
     stages: int
-    """Growth ends after this many stages. Each stage gives a larger region than the one before. Default: it ends when a stage gains
-    little.
+    """Growth ends after this many stages. Each stage gives a larger region than the one before. Default: it ends when a region keeps
+    0.95 of the proposal, or a stage gains little.
     """
     paper: PaperOptions
     """Grow with the papers' algorithm instead: it shrinks the first polytope until every pair has one plane that moves with the joints,
@@ -153,7 +153,7 @@ class CoverOptions(JobOptions, total=False):
     """Most cells of a pair in each stage of a region. After that, new faces cut off the cells that are still undecided. Default: 6000."""
     stages: int
     """The growth of a region ends after this many stages. A further stage makes the region larger. Default: 1 for robots with more than
-    4 joints; else a region ends when a stage gains little.
+    4 joints; else as for one region.
     """
     random_seed: int
     """Seed of every random choice. Default: 0."""

@@ -83,7 +83,11 @@ class Growing(Kind):
         return isinstance(action, Finish) or (isinstance(action, Certify) and not action.pairs)
 
     def late(self, session: Session, job: JobRow) -> Finish:
-        scene, state = load_scene(job.scene_id), _state(jobs.growth(session, job.id))
+        scene = load_scene(job.scene_id)
+        try:
+            state = _state(jobs.growth(session, job.id))
+        except CirisError:  # Another version of this program stored it. The job has to end all the same.
+            state = None
         return growing.late(scene, state, bool(steps.accepted(session, job.id)), events.last(session, job.id, events.NOTE) or {})
 
     def do(self, claim: steps.Claim, scene: Scene) -> Done:

@@ -34,6 +34,7 @@ from certifier.outcome import Outcome, combine
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
 from certifier.polytopes.polytope import chebyshev_center
 from certifier.polytopes.proved import ProvedBox
+from certifier.polytopes.pushed import pushed
 from certifier.positions import check_magnitude
 from certifier.seeding.options import IRIS_SEEDS
 from certifier.seeding.proposal import Proposal
@@ -135,7 +136,8 @@ def _proposed(scene: Scene, state: GrowthState, proposal: Proposal) -> Transitio
     start = Start(rows, proposal.center, keep, _hindrance(state, proposal))
     if isinstance(state, PaperState):
         return papers.begin(scene, replace(state, start=start), start, proposal.info.get("method"))
-    return begin_stage(scene, replace(state, start=start), rows)
+    # Rows that other rows imply would go with every cell.
+    return begin_stage(scene, replace(state, start=start), pushed(rows, start.seed, 1.0, scene.polytope([], [])))
 
 
 def _certified(scene: Scene, state: GrowthState, report: Outcomes) -> Transition:

@@ -11,6 +11,8 @@ from certifier.options import option, read
 from certifier.seeding.options import OF_PAPER
 
 MOST_CELLS = 20_000
+ENOUGH = 0.95
+"""Growth ends with a region that keeps this share of the proposal: a further stage takes as long as the one before, and gains little."""
 MOST_GIVEN = 10_000_000
 """Nobody may ask for more cells of a pair."""
 
@@ -57,7 +59,7 @@ class GrowthOptions:
     stages: int | None = option(
         None,
         "Growth ends after this many stages. Each stage gives a larger region than the one before.",
-        otherwise="it ends when a stage gains little",
+        otherwise=f"it ends when a region keeps {ENOUGH} of the proposal, or a stage gains little",
         least=1,
         greatest=100,
     )

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 from certifier.growth.actions import Certify, Finish, Outcomes, Transition
 from certifier.growth.obstacles import Obstacle, joined
-from certifier.growth.options import MOST_CELLS
+from certifier.growth.options import ENOUGH, MOST_CELLS
 from certifier.growth.pairs import by_joints, joints_between
 from certifier.growth.state import GrowthState, Start, Whole
 from certifier.model import Array, Polytope, Scene
@@ -31,12 +31,11 @@ FAR = 1.2
 SMALLER = 0.7
 """Where something would have to be cut off that no face separates from a point to keep, the stage begins anew with a smaller copy of the
 polytope: its faces at this part of their distance from the seed."""
-LEAST = 0.01
-"""A copy that keeps less than this share of the proposal is not tried."""
-ENOUGH = 0.95
-"""Growth ends with a region that keeps this share of the proposal: a further stage takes as long as the one before, and gains little."""
-GAIN = 0.02
-"""Growth ends with a stage that gains less than this share of the proposal."""
+LEAST, SHRUNK = 0.01, 0.8
+"""A copy that keeps less than the share LEAST of the proposal is not tried, nor one that keeps more than SHRUNK of the polytope's share:
+where few faces are no joint limits, copies hardly become smaller."""
+GAIN, OWN = 0.02, 0.5
+"""Growth ends with a stage that gains less than the share GAIN of the proposal, and less than the share OWN of the region before."""
 SLICE = 100
 """Number of cells to look at in one round, for every part of a pair."""
 PARTS, PIECES = 3, 12
@@ -54,6 +53,8 @@ PATIENCE cells of a hard pair."""
 FAST_LOSS = 0.05
 """They lose at most this share before that, and when the pair's effort is spent. From then on, the share doubles after
 every PIECES slices."""
+MOST_DOUBLED = 30
+"""Whatever has doubled this many times is everything."""
 CONTACT_LOSS = 0.01
 """Contacts have to be cut off sooner or later, and no cell settles them. For them, faces may always lose this share where that is needed,
 and twice as much after every PIECES slices."""
@@ -61,9 +62,9 @@ ENDING = 60 * SLICE
 """When the effort is spent, open cells are cut off where coarse volumes touch; after this many more cells, wherever they are."""
 LATE = 0.6
 """When this share of a stage's time until the deadline has passed, its effort counts as spent, so that there is still time for a region."""
-LATE_LOSS, LATER = 0.01, 0.05
-"""From then on, faces for a pair lose at most LATE_LOSS of the polytope in a round. The share doubles whenever LATER more of the time has
-passed, so that the rounds end before the deadline, however long they take."""
+LATE_LOSS, LATER = 0.01, 0.04
+"""From then on, faces for a pair lose at most LATE_LOSS of the polytope in a round, or for contacts what they may lose anyway. The share
+doubles whenever LATER more of the time has passed, so that the rounds end before the deadline, however long they take."""
 LATEST = 0.75
 """When this share has passed, all open cells are cut off, not only those where coarse volumes touch."""
 REVOKED = "revoked: "
@@ -80,7 +81,7 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
     kept = _kept(scene, start, best.polytope)
     if start.again:
         return Transition(state, Finish(Outcome.CERTIFIED, f"certified; {100 * kept:.3g} % of the region is kept"))
-    if kept >= ENOUGH or whole.stage == state.options.stages or (whole.stage > 1 and kept < whole.kept + GAIN):
+    if kept >= ENOUGH or whole.stage == state.options.stages or (whole.stage > 1 and kept <= whole.kept + min(GAIN, OWN * whole.kept)):
         return Transition(state, Finish(Outcome.CERTIFIED, "certified"))
     return begin_stage(scene, state, pushed(best.polytope, start.seed, FAR, start.rows), kept, whole.passed, whole.stage + 1)
 
@@ -103,11 +104,13 @@ def _kept(scene: Scene, start: Start, polytope: Polytope) -> float:
     return float(polytope.contains(samples_of(scene, start.rows)).mean())
 
 
-def _worth_a_stage(scene: Scene, state: GrowthState, start: Start, polytope: Polytope) -> bool:
-    """Returns whether a copy has all points to keep inside, and keeps more of the proposal than LEAST and the best region."""
-    if start.again or not (start.keep @ polytope.C.T < polytope.d).all():
+def _worth_a_stage(scene: Scene, state: GrowthState, start: Start, copy: Polytope) -> bool:
+    """Returns whether a smaller copy of the stage's polytope is worth a try."""
+    assert state.whole is not None
+    if start.again or not (start.keep @ copy.C.T < copy.d).all():
         return False
-    return _kept(scene, start, polytope) > max(LEAST, _kept(scene, start, state.best.polytope) if state.best else 0)
+    best = _kept(scene, start, state.best.polytope) if state.best else 0.0
+    return max(LEAST, best) < _kept(scene, start, copy) < SHRUNK * _kept(scene, start, state.whole.polytope)
 
 
 def keeps_more(scene: Scene, start: Start, polytope: Polytope, other: Polytope) -> bool:
@@ -207,9 +210,14 @@ def _cut_off(
     for i in failing:
         weakness, joints, most = report.weaknesses[i], joints_between(scene, i), _most_loss(state, whole, i, report)
         points, k = weakness.points, weakness.contacts
-        of_contacts = min(CONTACT_LOSS * 2.0 ** (whole.spent[i] // (PIECES * SLICE)), 1.0)
+        of_contacts = _doubled(CONTACT_LOSS, whole.spent[i] // (PIECES * SLICE))
         corners += [(joints, points[:k], max(most, of_contacts)), (weakness.joints or joints, points[k:], most)]
     return cut(scene, whole.polytope, start.keep, corners, start.rows, beyond)
+
+
+def _doubled(share: float, times: float) -> float:
+    """Returns a share that has doubled so often, at most all."""
+    return float(min(share * 2.0 ** min(times, MOST_DOUBLED), 1.0))
 
 
 def _obstacles(stage: int, failing: Sequence[int], cut: Cut) -> dict[int, Obstacle]:
@@ -227,11 +235,11 @@ def _most_loss(state: GrowthState, whole: Whole, pair: int, report: Outcomes) ->
     """Returns which share of the polytope the faces for a pair may lose in this round, for points that are no contacts."""
     hard = 0 if report.weaknesses[pair].joints else HARD
     if _gone(whole) >= LATE:
-        return float(min(LATE_LOSS * 2.0 ** ((_gone(whole) - LATE) / LATER), 1.0))
+        return _doubled(LATE_LOSS, (_gone(whole) - LATE) / LATER)
     effort, spent = _effort(state, whole, pair), whole.spent[pair]
     if hard < spent < effort:
-        return float(LOSS * 2.0 ** (max(spent - HARD, 0) // PATIENCE))
-    return float(min(FAST_LOSS * 2.0 ** max((spent - effort) // (PIECES * SLICE), 0), 1.0))
+        return _doubled(LOSS, max(spent - HARD, 0) // PATIENCE)
+    return _doubled(FAST_LOSS, max(spent - effort, 0) // (PIECES * SLICE))
 
 
 def _effort(state: GrowthState, whole: Whole, pair: int) -> int:

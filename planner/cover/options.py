@@ -60,7 +60,7 @@ class CoverOptions:
     stages: int | None = option(
         None,
         "The growth of a region ends after this many stages. A further stage makes the region larger.",
-        otherwise=f"{STAGES} for robots with more than {MOST_JOINTS} joints; else a region ends when a stage gains little",
+        otherwise=f"{STAGES} for robots with more than {MOST_JOINTS} joints; else as for one region",
         least=1,
         greatest=100,
     )

@@ -47,6 +47,7 @@ PROPOSAL = Proposal(
     contain=np.array([[0.2, 0.0]]),
     info={},
 )
+CERTIFIED = Outcome.CERTIFIED, None
 CORNER = np.array([[0.9, 0.9], [0.85, 0.9]])
 OPEN = 1
 """So many cells does the oracle leave open in every part."""
@@ -56,7 +57,7 @@ def options(cells=SLICE, **others):
     return GrowthOptions(seed={}, cells=cells, **others)
 
 
-def drive(verdict, asked, limit=40, passed=lambda action: 0.0):
+def drive(verdict, asked, limit=40, passed=lambda action: 0.0, proposal=PROPOSAL):
     """Runs the machine against an oracle: (pair, Certify) -> (outcome, weakness or None).
 
     Args:
@@ -76,7 +77,7 @@ def drive(verdict, asked, limit=40, passed=lambda action: 0.0):
         action = transition.action
         if isinstance(action, Finish):
             return made, accepted, action
-        report = PROPOSAL
+        report = proposal
         if not isinstance(action, Propose):
             assert isinstance(action, Certify)
             made.append(action)
@@ -285,15 +286,54 @@ def test_open_cells_are_dealt_to_parts_and_a_pair_without_any_is_put_together_in
     assert transition.state.best.iteration == 4
 
 
-def test_a_contact_at_a_configuration_to_keep_ends_without_a_region():
-    """Smaller copies are tried, as long as they keep something."""
-    made, accepted, end = drive(lambda i, action: (Outcome.REFUTED, weak([[0.1, 0.0]])), options())
-    scales = SMALLER ** np.arange(len(made))
-    assert [action.polytope.d[0] for action in made] == pytest.approx(scales.tolist())
-    assert scales[-1] ** 2 > LEAST > (SMALLER * scales[-1]) ** 2 or SMALLER * scales[-1] < 0.2, "the copy has all points to keep inside"
+FACES = {"all around": PROPOSAL.C, "on one side": PROPOSAL.C[:1], "none": PROPOSAL.C[:0]}
+
+
+@pytest.mark.parametrize(
+    ("faces", "contain", "copies"),
+    [
+        ("all around", [[0.2, 0.0]], 4),  # the next copy does not have this point inside
+        ("all around", [], 7),  # the next copy keeps less than LEAST
+        ("on one side", [], 0),  # a copy would hardly be smaller
+        ("none", [], 0),
+    ],
+)
+def test_a_contact_at_a_configuration_to_keep_ends_without_a_region(faces, contain, copies):
+    """Smaller copies are tried, as long as they become smaller and keep something."""
+    proposal = replace(PROPOSAL, C=FACES[faces], d=PROPOSAL.d[: len(FACES[faces])], contain=np.array(contain).reshape(-1, 2))
+    at_seed = (Outcome.REFUTED, weak([[0.0, 0.0]]))
+    made, accepted, end = drive(lambda i, action: at_seed, options(), proposal=proposal)
+    assert len(made) == 1 + copies
+    if copies:
+        assert [action.polytope.d[0] for action in made] == pytest.approx((SMALLER ** np.arange(1 + copies)).tolist())
+        # The sides of a box in q; the proposal's are pi / 2.
+        assert (4 / np.pi * np.arctan(SMALLER ** (1 + copies))) ** 2 < LEAST or contain
     assert not accepted
     assert end.outcome is Outcome.REFUTED
     assert SCENE.pairs[0].a in end.reason
+
+
+def test_a_copy_has_to_keep_more_than_the_best_region(demanding):
+    """The stage before has a region of 0.95, and no copy of the second one's polytope keeps that."""
+    made, accepted, end = drive(in_the_second_stage((Outcome.REFUTED, weak([[0.0, 0.0]]))), options())
+    assert (len(made), len(accepted)) == (3, 1)
+    assert "ended early" in end.reason
+
+
+@pytest.mark.parametrize("cells", [1, 10_000_000])
+def test_faces_for_contacts_may_lose_twice_as_much_again_and_again(cells):
+    """A face in the way of a contact would lose a third of the polytope. No cell settles the contact, so it goes at last."""
+    contact = np.array([[0.3, 0.3]])
+
+    def verdict(index, action):
+        return (
+            (Outcome.REFUTED, replace(weak(contact), contacts=1)) if index == 1 and action.polytope.contains(contact).any() else CERTIFIED
+        )
+
+    made, accepted, _ = drive(verdict, options(cells=cells, stages=1), limit=100)
+    assert 1 < len(made) < 40
+    assert not accepted[-1].polytope.contains(contact).any()
+    assert whole._doubled(0.01, 10**9) == 1.0
 
 
 def test_where_nothing_can_be_cut_off_a_smaller_copy_is_tried():
