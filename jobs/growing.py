@@ -86,7 +86,7 @@ class Growing(Kind):
         scene = load_scene(job.scene_id)
         try:
             state = _state(jobs.growth(session, job.id))
-        except CirisError:  # Another version of this program stored it. The job has to end all the same.
+        except CirisError:  # Another version of ciris stored it. The job ends at its deadline anyway.
             state = None
         return growing.late(scene, state, bool(steps.accepted(session, job.id)), events.last(session, job.id, events.NOTE) or {})
 

@@ -136,7 +136,7 @@ def _proposed(scene: Scene, state: GrowthState, proposal: Proposal) -> Transitio
     start = Start(rows, proposal.center, keep, _hindrance(state, proposal))
     if isinstance(state, PaperState):
         return papers.begin(scene, replace(state, start=start), start, proposal.info.get("method"))
-    # Rows that other rows imply would go with every cell.
+    # Rows that other rows imply are dropped, because every cell would carry them.
     return begin_stage(scene, replace(state, start=start), pushed(rows, start.seed, 1.0, scene.polytope([], [])))
 
 

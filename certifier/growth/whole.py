@@ -4,8 +4,8 @@ One round looks at a fixed number of cells of every pair that is not certified y
 close. What is proved stays proved, because the polytope only shrinks. The rounds go on until every pair is certified. When the effort is
 spent, all cells that are still open are cut off as well.
 
-The first stage certifies the proposal itself. Where it keeps little, there are further stages: the faces of the region move out, as far as
-the proposal, and what is between is certified in the same way.
+The first stage certifies the proposal itself. Where the region keeps too little, further stages follow. They move its faces out, as far as
+the proposal, and certify all pairs anew.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ SMALLER = 0.7
 """Where something would have to be cut off that no face separates from a point to keep, the stage begins anew with a smaller copy of the
 polytope: its faces at this part of their distance from the seed."""
 LEAST, SHRUNK = 0.01, 0.8
-"""A copy that keeps less than the share LEAST of the proposal is not tried, nor one that keeps more than SHRUNK of the polytope's share:
-where few faces are no joint limits, copies hardly become smaller."""
+"""A copy is tried only if it keeps the share LEAST of the proposal, and at most SHRUNK of what the polytope keeps. Where nearly all faces
+are joint limits, a copy is hardly smaller, and copies would not end."""
 GAIN, OWN = 0.02, 0.5
-"""Growth ends with a stage that gains less than the share GAIN of the proposal, and less than the share OWN of the region before."""
+"""Growth ends with a stage that gains less than the share GAIN of the proposal. A small region has to gain the share OWN of itself only."""
 SLICE = 100
 """Number of cells to look at in one round, for every part of a pair."""
 PARTS, PIECES = 3, 12
@@ -51,20 +51,18 @@ LOSS, PATIENCE = 0.002, 108 * SLICE
 """While open cells of a pair are cut off, its faces lose at most the share LOSS of the polytope in a round. The share doubles after every
 PATIENCE cells of a hard pair."""
 FAST_LOSS = 0.05
-"""They lose at most this share before that, and when the pair's effort is spent. From then on, the share doubles after
-every PIECES slices."""
-MOST_DOUBLED = 30
-"""Whatever has doubled this many times is everything."""
+"""They lose at most this share before that, and when the pair's effort is spent. From then on, the share doubles after every PIECES
+slices."""
 CONTACT_LOSS = 0.01
-"""Contacts have to be cut off sooner or later, and no cell settles them. For them, faces may always lose this share where that is needed,
-and twice as much after every PIECES slices."""
+"""No cell settles a contact, so it has to be cut off sooner or later. Faces for contacts may always lose this share of the polytope in a
+round. The share doubles after every PIECES slices."""
 ENDING = 60 * SLICE
 """When the effort is spent, open cells are cut off where coarse volumes touch; after this many more cells, wherever they are."""
 LATE = 0.6
 """When this share of a stage's time until the deadline has passed, its effort counts as spent, so that there is still time for a region."""
 LATE_LOSS, LATER = 0.01, 0.04
-"""From then on, faces for a pair lose at most LATE_LOSS of the polytope in a round, or for contacts what they may lose anyway. The share
-doubles whenever LATER more of the time has passed, so that the rounds end before the deadline, however long they take."""
+"""From then on, faces for open cells of a pair lose at most the share LATE_LOSS of the polytope in a round. The share doubles whenever
+LATER more of the time has passed, so that the rounds end before the deadline, however long they take."""
 LATEST = 0.75
 """When this share has passed, all open cells are cut off, not only those where coarse volumes touch."""
 REVOKED = "revoked: "
@@ -81,7 +79,8 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
     kept = _kept(scene, start, best.polytope)
     if start.again:
         return Transition(state, Finish(Outcome.CERTIFIED, f"certified; {100 * kept:.3g} % of the region is kept"))
-    if kept >= ENOUGH or whole.stage == state.options.stages or (whole.stage > 1 and kept <= whole.kept + min(GAIN, OWN * whole.kept)):
+    gained_little = whole.stage > 1 and kept <= whole.kept + min(GAIN, OWN * whole.kept)
+    if kept >= ENOUGH or whole.stage == state.options.stages or gained_little:
         return Transition(state, Finish(Outcome.CERTIFIED, "certified"))
     return begin_stage(scene, state, pushed(best.polytope, start.seed, FAR, start.rows), kept, whole.passed, whole.stage + 1)
 
@@ -104,13 +103,15 @@ def _kept(scene: Scene, start: Start, polytope: Polytope) -> float:
     return float(polytope.contains(samples_of(scene, start.rows)).mean())
 
 
-def _worth_a_stage(scene: Scene, state: GrowthState, start: Start, copy: Polytope) -> bool:
-    """Returns whether a smaller copy of the stage's polytope is worth a try."""
+def _smaller_copy(scene: Scene, state: GrowthState, start: Start) -> Polytope | None:
+    """Returns a smaller copy of the stage's polytope about the seed; None where it is not worth a try."""
     assert state.whole is not None
+    copy = pushed(state.whole.polytope, start.seed, SMALLER, scene.polytope([], []))
     if start.again or not (start.keep @ copy.C.T < copy.d).all():
-        return False
+        return None
     best = _kept(scene, start, state.best.polytope) if state.best else 0.0
-    return max(LEAST, best) < _kept(scene, start, copy) < SHRUNK * _kept(scene, start, state.whole.polytope)
+    worth = max(LEAST, best) < _kept(scene, start, copy) < SHRUNK * _kept(scene, start, state.whole.polytope)
+    return copy if worth else None
 
 
 def keeps_more(scene: Scene, start: Start, polytope: Polytope, other: Polytope) -> bool:
@@ -151,8 +152,8 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
         pair = scene.pairs[failing[0]]
         return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing more could be cut off for them")
     if smaller is None:
-        copy = pushed(whole.polytope, start.seed, SMALLER, scene.polytope([], []))
-        if _worth_a_stage(scene, state, start, copy):
+        copy = _smaller_copy(scene, state, start)
+        if copy is not None:
             return begin_stage(scene, state, copy, whole.kept, whole.passed, whole.stage)
         pair = scene.pairs[failing[0]]
         reason = f"{pair.a} and {pair.b} touch, or come too close, at or between configurations that have to stay inside"
@@ -216,8 +217,8 @@ def _cut_off(
 
 
 def _doubled(share: float, times: float) -> float:
-    """Returns a share that has doubled so often, at most all."""
-    return float(min(share * 2.0 ** min(times, MOST_DOUBLED), 1.0))
+    """Returns the share after it was doubled this many times; 1 where it would be more."""
+    return 1.0 if times >= -math.log2(share) else share * 2.0**times
 
 
 def _obstacles(stage: int, failing: Sequence[int], cut: Cut) -> dict[int, Obstacle]:

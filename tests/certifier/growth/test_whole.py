@@ -19,8 +19,8 @@ from certifier.errors import CirisError
 from certifier.growth import whole
 from certifier.growth.actions import Certify, Finish, Outcomes, Propose
 from certifier.growth.machine import advance, begin
-from certifier.growth.options import GrowthOptions
-from certifier.growth.state import GrowthState, Whole
+from certifier.growth.options import ENOUGH, GrowthOptions
+from certifier.growth.state import Best, GrowthState, Start, Whole
 from certifier.growth.whole import FAR, GAIN, HARD, LATE, LATEST, LEAST, PARTS, PIECES, SLICE, SMALLER, VERIFIED
 from certifier.jobs import local
 from certifier.jobs.local import grow
@@ -50,7 +50,7 @@ PROPOSAL = Proposal(
 CERTIFIED = Outcome.CERTIFIED, None
 CORNER = np.array([[0.9, 0.9], [0.85, 0.9]])
 OPEN = 1
-"""So many cells does the oracle leave open in every part."""
+"""The oracle leaves this many cells open in every part."""
 
 
 def options(cells=SLICE, **others):
@@ -150,7 +150,7 @@ def test_a_contact_on_a_face_does_not_end_growth():
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_growth_ends_after_so_many_stages(count, demanding):
+def test_growth_ends_after_the_stages_that_are_asked_for(count, demanding):
     corner = np.array([[0.4, 0.8], [0.8, 0.4]])
 
     def verdict(index, action):
@@ -346,6 +346,19 @@ def test_where_nothing_can_be_cut_off_a_smaller_copy_is_tried():
     assert [action.polytope.d[0] for action in made] == pytest.approx([1.0, SMALLER, SMALLER**2])
     assert accepted[-1].polytope is made[-1].polytope
     assert (end.outcome, end.reason) == (Outcome.CERTIFIED, "certified")
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "ends"),
+    [(0.5, 0.51, True), (0.5, 0.53, False), (0.004, 0.005, True), (0.004, 0.007, False), (0.0, 0.0, True), (0.5, ENOUGH, True)],
+)
+def test_a_small_region_grows_on_although_it_gains_little_of_the_proposal(monkeypatch, before, now, ends):
+    polytope = SCENE.polytope(PROPOSAL.C, PROPOSAL.d)
+    stage = Whole(before, polytope, *np.zeros((2, 2)), *np.zeros((2, 2, 8)), stage=2)
+    state = GrowthState(options(), best=Best(0, polytope, np.zeros(2), 1.0), whole=stage)
+    monkeypatch.setattr(whole, "_kept", lambda *_: now)
+    following = whole._next_stage(SCENE, state, Start(polytope, np.zeros(2), np.zeros((1, 2))))
+    assert isinstance(following.action, Finish) == ends
 
 
 def in_the_second_stage(found):
