@@ -288,7 +288,7 @@ class PairRow(Leased, Base):
     __tablename__ = "pairs"
     __table_args__ = (
         UniqueConstraint("job_id", "iteration", "pair_index", "part"),
-        Index(None, "state", "lease_token"),
+        Index(None, "state", "lease_token", postgresql_where=text("state = 'running'")),
         Index(None, "job_id", "state", "deaths", "id"),
         _proofs_of("pairs"),
     )

@@ -21,6 +21,7 @@ from certifier.outcome import Outcome, combine
 from certifier.pair.result import PairResult
 from db import events, jobs, leases, proofs, subtrees
 from db.models import IterationRow, JobRow, PairRow
+from db.session import without_sorting
 from db.states import PAIR, IterationState, PairState, transition, transition_each, unfinished
 from db.types import utcnow
 
@@ -140,6 +141,7 @@ def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds:
     is_open = (PairRow.job_id == job.id, PairRow.state == PairState.OPEN)
     ahead = tuple_(PairRow.deaths, PairRow.id) >= tuple_(0, job.next_pair)
     first = select(*columns).where(*is_open, ahead).order_by(PairRow.deaths, PairRow.id).limit(MOST_TOGETHER)
+    without_sorting(session)
     rows = session.execute(first).all()
     fresh = [row for row in rows if row.deaths == 0]
     seconds = batch_length(job.open_pairs, batch_seconds)
@@ -212,6 +214,7 @@ def _last_failure(session: Session, job_id: str, iteration: int) -> int | None:
     if enough is None:
         return None
     # One query a state, in the order of the index: so the databases use it even when they know nothing about the table yet.
+    without_sorting(session)
     mine = select(PairRow.id).where(PairRow.job_id == job_id, PairRow.iteration == iteration).order_by(PairRow.deaths, PairRow.id)
     failed = sorted(pair for state in FAILED for pair in session.scalars(mine.where(PairRow.state == state)))
     return failed[enough - 1] if len(failed) >= enough else None

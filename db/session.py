@@ -27,7 +27,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, Dialect, Engine, QueuePool, create_engine, event
+from sqlalchemy import Connection, Dialect, Engine, QueuePool, create_engine, event, text
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import DisconnectionError, InterfaceError, OperationalError, TimeoutError
@@ -167,6 +167,15 @@ class Database:
     def close(self) -> None:
         self.reader.dispose()
         self.writer.dispose()
+
+
+def without_sorting(session: Session) -> None:
+    """Makes PostgreSQL answer the queries of this transaction from an index that has their order, where there is one.
+
+    PostgreSQL knows nothing yet about rows that are newer than its statistics. It expects few of them, and may read and sort them all.
+    """
+    if session.get_bind().dialect.name == "postgresql":
+        session.execute(text("SET LOCAL enable_sort = off"))
 
 
 def insert_new(session: Session, model: type[DeclarativeBase], rows: list[dict[str, Any]]) -> int:
