@@ -19,6 +19,7 @@ from benchmarks import (
     fleet,
     growth,
     makers,
+    maps,
     models,
     path,
     plan,
@@ -102,6 +103,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "cover": _cover,
     "robots": lambda args, screen: robots.robots(args.robots, args.deadline, screen.line),
     "arms": lambda args, screen: makers.arms(args.arms, args.deadline, args.motions, screen.line),
+    "map": lambda args, screen: maps.maps(args.scenes, args.limit, screen.line),
     "recertify": lambda args, screen: recertify.changes(args.scenes, args.limit, screen.line),
     "query": lambda args, screen: query.query(args.regions, screen.line),
     "plan": lambda args, screen: plan.motions(args.scene, args.url, args.queries, args.points, screen.line),
@@ -197,6 +199,12 @@ def _parser() -> ArgumentParser:
     planned.add_argument(
         "--points", type=_count, default=plan.POINTS, metavar="N", help=f"points of each motion that Drake looks at; default {plan.POINTS}"
     )
+    mapped = kinds.add_parser("map", parents=[as_json], help="grow maps, look configurations and motions up in them, and connect some")
+    mapped.add_argument("scenes", nargs="*", metavar="EXAMPLE", default=list(maps.SCENES), help=f"default: {', '.join(maps.SCENES)}")
+    mapped.add_argument(
+        "--limit", type=float, default=maps.LIMIT, metavar="SECONDS", help=f"each map ends after so long; default {maps.LIMIT:g}"
+    )
+
     changed = kinds.add_parser("recertify", parents=[as_json], help="certify regions again whose scenes have changed, and grow them anew")
     changed.add_argument(
         "scenes", nargs="*", metavar="EXAMPLE", default=list(recertify.SCENES), help=f"default: {', '.join(recertify.SCENES)}"

@@ -408,6 +408,32 @@ def _recertify(document: Document) -> list[str]:
     return [_table(header, rows)]
 
 
+def _map(document: Document) -> list[str]:
+    """Returns a table with one line for each scene."""
+    header = [
+        "example",
+        "pairs",
+        "covered",
+        "cells",
+        "proof",
+        "verify",
+        "free set",
+        "point",
+        "1000 points",
+        "motion",
+        "straight",
+        "connected",
+    ]
+    rows = []
+    for row in document["rows"]:
+        over_time = ", ".join(f"{share:.2f} after {seconds(at)}" for at, share in row["over_time"])
+        sizes = [f"{row['proof_bytes'] / 1e6:.2f} MB", seconds(row["verify_seconds"]), f"{row['free_set_bytes'] / 1e3:.0f} kB"]
+        costs = [f"{1e6 * row[what]['p99']:.0f} us" for what in ("point_seconds", "batch_seconds", "motion_seconds")]
+        rows.append([row["example"], str(row["pairs"]), over_time, str(row["cells"]), *sizes, *costs])
+        rows[-1] += [f"{row['straight']:.2f}", f"{row['connected']:.2f}"]
+    return [_table(header, rows)]
+
+
 _TABLES: dict[str, Callable[[Document], list[str]]] = {
     "pairs": _compared,
     "scene": _compared,
@@ -424,5 +450,6 @@ _TABLES: dict[str, Callable[[Document], list[str]]] = {
     "query": _query,
     "plan": _plan,
     "recertify": _recertify,
+    "map": _map,
     "cover": _cover,
 }

@@ -5,6 +5,7 @@ from certifier.outcome import Guarantee, Outcome
 from ciris.answers import Containment, Cover, Coverage, Event, Graph, Motion, Nearest, Obstacle, Plan, Segments, Verification
 from ciris.asynchronous.service import AsyncJob, AsyncRegion, AsyncService
 from ciris.connecting import connect, connect_async
+from ciris.free_set import FreeSet, OpenPart
 from ciris.scene import Scene
 from ciris.space import Space
 from ciris.synchronous.service import Job, Region, Service
@@ -18,12 +19,14 @@ __all__ = [
     "Cover",
     "Coverage",
     "Event",
+    "FreeSet",
     "Graph",
     "Guarantee",
     "Job",
     "Motion",
     "Nearest",
     "Obstacle",
+    "OpenPart",
     "Outcome",
     "Plan",
     "Region",

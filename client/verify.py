@@ -84,7 +84,7 @@ def _answer(path: Path) -> dict[str, Any]:
             )
     except CirisError as error:
         if error.code == "no_file":
-            raise CirisError("no_file", error.message, hint="name a proof file") from None
+            raise
         found = {"holds": False, "error": {**error.to_document(), "message": escaped(error.message)}}
     if not found["holds"]:
         found["error"]["hint"] = found["error"]["hint"] or (UNCHECKED if found["error"]["code"] == "proof_too_large" else REFUSED)

@@ -63,7 +63,7 @@ LATE = 0.6
 LATE_LOSS, LATER = 0.01, 0.04
 """From then on, faces for open cells of a pair lose at most the share LATE_LOSS of the polytope in a round. The share doubles whenever
 LATER more of the time has passed, so that the rounds end before the deadline, however long they take."""
-LATEST = 0.75
+LATEST = 0.65
 """When this share has passed, all open cells are cut off, not only those where coarse volumes touch."""
 REVOKED = "revoked: "
 """The reason begins like this where nothing is left of a region that is certified again."""

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from certifier.errors import CirisError, RegionError, unreadable
+from certifier.errors import RegionError
 from certifier.growth.pairs import alike
 from certifier.jobs.parallel import side_by_side
 from certifier.kinematics import Kinematics
@@ -24,9 +24,9 @@ from certifier.outcome import Outcome
 from certifier.pair.result import PairResult
 from certifier.partition.certification import CellCertification
 from certifier.polytopes.sampling import hit_and_run
-from certifier.proof.limits import FILE_BYTES
 from certifier.proof.region import RegionProof, read_part
 from certifier.verify import uncovered
+from certifier.verify.file import read_file
 from certifier.verify.region import verify_region
 
 SAMPLES, DESCENTS, STEPS = 4000, 24, 60
@@ -214,10 +214,5 @@ def clearance_in_child(payload: dict[str, Any]) -> dict[str, Any]:
         CirisError: no_file, when the file cannot be read.
         ProofError: as :func:`clearance`.
     """
-    try:
-        with open(payload["path"], "rb") as file:
-            data = file.read(FILE_BYTES + 1)
-    except OSError as error:
-        raise CirisError("no_file", unreadable(error), hint="name a proof file") from None
-    found = clearance(data, payload["processes"])
+    found = clearance(read_file(payload["path"]), payload["processes"])
     return {**found.document(), "proof": None if found.proof is None else base64.b64encode(found.proof).decode()}

@@ -127,12 +127,20 @@ def answer_about_file(payload: dict[str, Any]) -> dict[str, Any]:
     Raises:
         CirisError: no_file, when the file cannot be read.
     """
+    return answer(read_file(payload["path"]), payload.get("processes", 1), _teller(payload["progress"]) if "progress" in payload else None)
+
+
+def read_file(path: str) -> bytes:
+    """Returns the bytes of a proof file, and one more than the verifier takes of a file that is too large.
+
+    Raises:
+        CirisError: no_file, when the file cannot be read.
+    """
     try:
-        with open(payload["path"], "rb") as file:
-            data = file.read(limits.FILE_BYTES + 1)
+        with open(path, "rb") as file:
+            return file.read(limits.FILE_BYTES + 1)
     except OSError as error:
-        raise CirisError("no_file", unreadable(error)) from None
-    return answer(data, payload.get("processes", 1), _teller(payload["progress"]) if "progress" in payload else None)
+        raise CirisError("no_file", unreadable(error), hint="name a proof file") from None
 
 
 def _teller(path: str) -> Progress:

@@ -104,6 +104,11 @@ def add(verbs: Any) -> None:
     verify.add_argument("proof", metavar="PROOF", help="the proof file")
     verify.set_defaults(run="client.verify:verify")
 
+    free_set = verbs.add_parser("free-set", parents=[as_json()], help="check a map's proof, and write its cells for quick lookups")
+    free_set.add_argument("proof", metavar="PROOF", help="the proof file of a map")
+    free_set.add_argument("--out", metavar="FILE", help="new file to write; default: one in this directory, named after the scene")
+    free_set.set_defaults(run="client.free_set:write")
+
     clearance = verbs.add_parser(
         "clearance", parents=[as_json()], help="prove how far apart the bodies are all over a region, from its proof file"
     )

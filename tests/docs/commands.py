@@ -15,7 +15,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "commands.md"
 GROUPS = {
     "The service": ("up", "doctor", "key", "project", "worker"),
     "Scenes": ("scene",),
-    "Regions": ("grow", "map", "cover", "recertify", "certify", "region"),
+    "Regions": ("grow", "map", "free-set", "cover", "recertify", "certify", "region"),
     "Jobs": ("job",),
     "Motions and planning": ("plan", "path", "certify-path", "contains", "nearest", "graph"),
     "Proofs and measurements": ("verify", "clearance", "bench"),

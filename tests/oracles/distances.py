@@ -23,7 +23,8 @@ class Distances:
     """
 
     def __init__(self, path: Path) -> None:
-        said = yaml.safe_load(re.search(r"^padding: (.*)$", path.read_text(), re.MULTILINE)[1])
+        line = re.search(r"^padding: (.*)$", path.read_text(), re.MULTILINE)
+        said = yaml.safe_load(line[1]) if line else 0.0
         self._padding, self._own = (said["default"], said["bodies"]) if isinstance(said, dict) else (said, {})
         self._diagram = original_diagram(path)
         self._context = self._diagram.CreateDefaultContext()

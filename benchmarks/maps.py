@@ -1,0 +1,125 @@
+"""This module measures maps: what they cover over time, what lookups in their free sets cost, and which configurations these connect.
+
+Seconds are by the clock; nothing else should run on the machine.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
+
+from benchmarks import catalogue, measure
+from benchmarks.measure import Progress
+from certifier.jobs.map import grow_map
+from certifier.map.free_set import free_set
+from certifier.model import Array, Scene
+from certifier.pair.collisions import in_collision
+from certifier.verify.map import verify_map
+from ciris.free_set import FreeSet
+from client.cores import cores
+from planner.cover.ground import free_samples
+
+SCENES = ("planar_2dof", "arm_3dof", "iiwa_shelf", "ur3e_bin", "iiwa_gripper")
+COVERAGE, LIMIT = 0.98, 60.0
+TIMES = 8
+"""A row has the coverage at up to TIMES times, each about twice as late as the one before."""
+SINGLE, BATCH, QUERIES = 2000, 1000, 500
+NODES, NEAREST = 2000, 12
+"""The roadmap has NODES proved configurations, each joined to its NEAREST ones where the straight motion is proved."""
+
+
+def maps(names: list[str], limit: float, progress: Progress) -> dict[str, Any]:
+    """Grows the maps of examples. Returns the document of ``ciris bench map``.
+
+    Args:
+        limit: each map ends after this many seconds, or when it covers COVERAGE.
+    """
+    rows = []
+    for name in names:
+        progress(name)
+        rows.append(_row(name, catalogue.scene(name), limit))
+    return {"benchmark": "map", "machine": measure.machine(), "processes": cores(), "limit_seconds": limit, "rows": rows}
+
+
+def _row(name: str, scene: Scene, limit: float) -> dict[str, Any]:
+    told: list[tuple[float, float]] = []
+    found = grow_map(scene, COVERAGE, limit, cores(), lambda _, now: told.append((now["seconds"], now["coverage"])))
+    data = found.proof.to_bytes()
+    begin = time.perf_counter()
+    verify_map(data, cores())
+    verified = time.perf_counter() - begin
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "free.npz"
+        np.savez_compressed(path, **free_set(found.proof))
+        size, free = path.stat().st_size, FreeSet.load(path)
+    return {
+        "example": name,
+        "pairs": len(scene.pairs),
+        "coverage": {"value": found.coverage.share, "stderr": found.coverage.error},
+        "seconds": found.seconds,
+        "over_time": _few(told),
+        "cells": found.cells,
+        "proof_bytes": len(data),
+        "verify_seconds": verified,
+        "free_set_bytes": size,
+        **_asked(scene, free),
+    }
+
+
+def _few(told: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Returns a few of these, the last one among them."""
+    kept = told[-1:]
+    while told and len(kept) < TIMES and (earlier := [now for now in told if now[0] <= kept[0][0] / 2]):
+        kept = [earlier[-1], *kept]
+    return kept
+
+
+def _asked(scene: Scene, free: FreeSet) -> dict[str, Any]:
+    """Returns what lookups cost, and which share of random pairs of free configurations they connect."""
+    rng = np.random.default_rng(0)
+    drawn = scene.to_q(free_samples(scene, partial(in_collision, scene), NODES + 2 * QUERIES, rng))
+    asked, others = drawn[: 2 * QUERIES], drawn[2 * QUERIES :]
+    nodes = others[free.contains(others)]
+    start, end = nodes[: len(nodes) // 2], nodes[len(nodes) // 2 :][: len(nodes) // 2]
+    free.contains_motion(start, end)
+    batch = nodes[np.arange(BATCH) % len(nodes)]
+    return {
+        "point_seconds": _quantiles([partial(free.contains, q) for q in nodes[:SINGLE]]),
+        "batch_seconds": _quantiles([partial(free.contains, batch)] * 20),
+        "motion_seconds": _quantiles([partial(free.contains_motion, a, b) for a, b in zip(start, end, strict=True)]),
+        "straight": float(free.contains_motion(start, end).mean()),
+        "connected": _connected(free, nodes, asked),
+    }
+
+
+def _connected(free: FreeSet, nodes: Array, asked: Array) -> float:
+    """Returns the share of pairs of configurations that motions through the nodes connect, each of them proved."""
+    everything = np.concatenate([nodes, asked[free.contains(asked)]])
+    number = np.full(len(asked), -1)
+    number[free.contains(asked)] = len(nodes) + np.arange(len(everything) - len(nodes))
+    near = KDTree(everything).query(everything, NEAREST + 1)[1][:, 1:]
+    a, b = np.repeat(np.arange(len(everything)), NEAREST), near.ravel()
+    held = free.contains_motion(everything[a], everything[b])
+    edges = coo_array((held[held], (a[held], b[held])), shape=(len(everything),) * 2)
+    part = np.append(connected_components(edges, directed=False)[1], -1)
+    first, second = part[number[:QUERIES]], part[number[QUERIES:]]
+    return float(((first == second) & (first >= 0)).mean())
+
+
+def _quantiles(calls: list[Callable[[], object]]) -> dict[str, float]:
+    """Returns the median and the 99th percentile of what calls take, in seconds."""
+    taken = []
+    for call in calls:
+        begin = time.perf_counter()
+        call()
+        taken.append(time.perf_counter() - begin)
+    return {"p50": float(np.percentile(taken, 50)), "p99": float(np.percentile(taken, 99))}

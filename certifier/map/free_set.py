@@ -1,0 +1,139 @@
+"""The free set of a map is made here: its cells without their proofs, in joint positions, for quick lookups (ciris.free_set).
+
+A configuration is in the free set if each *clause* holds there: one of the clause's trees has a proved cell at it. Each pair of bodies has
+the trees that are about it; pairs with the same ones share a clause.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from certifier.errors import ProofError
+from certifier.model import Array, Pair, Scene
+from certifier.proof.map import MapProof, PairMap
+from certifier.proof.partition import PLANE
+from certifier.proof.sub_scene import sub_scene
+from certifier.verify.file import read_file
+from certifier.verify.map import verify_map
+
+FORMAT = 1
+"""Version of the file."""
+PROVED, OPEN = -1, -2
+"""These nodes of a tree are leaves."""
+
+
+def of_file(payload: dict[str, Any]) -> dict[str, Any]:
+    """Checks a map's file, and returns its free set as a file. It runs in a child process, because the map may come from a stranger.
+
+    Args:
+        payload: ``path`` of the map and ``processes``.
+
+    Returns:
+        The ``file`` in base 64, the ``name`` of the scene, and numbers of ``nodes`` and of proved ``cells``.
+
+    Raises:
+        CirisError: no_file.
+        ProofError: the file is no map, or does not hold.
+    """
+    data = read_file(payload["path"])
+    statement = verify_map(data, payload["processes"])
+    proof = MapProof.from_bytes(data)
+    arrays, written = free_set(proof), io.BytesIO()
+    np.savez_compressed(written, **arrays)
+    file = base64.b64encode(written.getvalue()).decode()
+    return {"name": proof.scene.name, "cells": statement.cells, "nodes": len(arrays["joint"]), "file": file}
+
+
+def free_set(proof: MapProof) -> dict[str, np.ndarray]:
+    """Returns the arrays of a verified map's free set, as ciris.lookups.Cells names them, and a ``head`` as JSON.
+
+    Raises:
+        ProofError: not_covered, where a pair has no tree with a proved cell, so that no configuration is free.
+    """
+    scene = proof.scene
+    trees = [_tree(scene, pairs, part) for pairs, part in zip(proof.pairs, proof.maps, strict=True)]
+    about: dict[Pair, list[int]] = {pair: [] for pair in scene.pairs}
+    for number, pairs in enumerate(proof.pairs):
+        if (proof.maps[number].nodes == PLANE).any():
+            for pair in pairs:
+                about[pair].append(number)
+    alone = next((pair for pair, numbers in about.items() if not numbers), None)
+    if alone is not None:
+        message = f"{alone.a} and {alone.b} have no proved cell, so no configuration is proved to be free"
+        raise ProofError("not_covered", message, hint="let the map grow for longer")
+    clauses: dict[tuple[int, ...], list[Pair]] = {}
+    for pair, numbers in about.items():
+        clauses.setdefault(tuple(numbers), []).append(pair)
+    sizes = [len(joint) for joint, _, _ in trees]
+    root = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+    head = {
+        "format": FORMAT,
+        "scene": scene.hash,
+        "name": scene.name,
+        "joints": [joint.name for joint in scene.moving],
+        "clauses": [[[pair.a, pair.b] for pair in pairs] for pairs in clauses.values()],
+    }
+    uppers = [np.where(joint >= 0, upper + begin, 0) for begin, (joint, _, upper) in zip(root, trees, strict=True)]
+    return {
+        "head": np.array(json.dumps(head)),
+        "q_star": scene.q_star,
+        "q_lower": scene.q_lower,
+        "q_upper": scene.q_upper,
+        "revolute": scene.revolute,
+        "joint": np.concatenate([joint for joint, _, _ in trees]),
+        "cut": np.concatenate([cut for _, cut, _ in trees]),
+        "upper": np.concatenate(uppers).astype(np.int32),
+        "root": root.astype(np.int32),
+        "first": np.concatenate([[0], np.cumsum([len(numbers) for numbers in clauses])]).astype(np.int32),
+        "tree": np.array([number for numbers in clauses for number in numbers], np.int32),
+    }
+
+
+def _tree(scene: Scene, pairs: Sequence[Pair], part: PairMap) -> tuple[np.ndarray, Array, np.ndarray]:
+    """Returns the joint, the cut in q and the upper part of each node of a tree. Parts that are alike all over become one leaf."""
+    positions, inner = sub_scene(scene, pairs).positions, part.nodes >= 0
+    joints = np.where(part.nodes == PLANE, PROVED, OPEN).astype(np.int16)
+    joints[inner] = positions[part.nodes[inner]] if inner.any() else 0
+    s = np.zeros((len(part.cuts), scene.n))
+    of_cuts = np.arange(len(s)), joints[inner]
+    s[of_cuts] = part.cuts
+    cuts = np.zeros(len(joints))
+    cuts[inner] = scene.to_q(s)[of_cuts]
+    return _smallest(joints, cuts)
+
+
+@njit(cache=True)
+def _smallest(joint: np.ndarray, cut: Array) -> tuple[np.ndarray, Array, np.ndarray]:
+    """Returns a tree in preorder with its upper parts, without the cuts whose both parts are wholly proved, or wholly open."""
+    N = len(joint)
+    kind, size, left = joint.copy(), np.ones(N, np.int32), np.ones(N, np.int32)
+    waiting, top = np.empty(N, np.int32), 0
+    upper_of = np.zeros(N, np.int32)
+    for node in range(N - 1, -1, -1):
+        if joint[node] >= 0:
+            lower, upper = waiting[top - 1], waiting[top - 2]
+            top -= 2
+            upper_of[node] = upper
+            size[node] = 1 + size[lower] + size[upper]
+            left[node] = 1 + left[lower] + left[upper]
+            if kind[lower] < 0 and kind[lower] == kind[upper]:
+                kind[node], left[node] = kind[lower], 1
+        waiting[top] = node
+        top += 1
+    joints, cuts, uppers = np.empty(left[0], np.int16), np.zeros(left[0]), np.zeros(left[0], np.int32)
+    node = 0
+    for at in range(left[0]):
+        joints[at] = kind[node]
+        if kind[node] < 0:
+            node += size[node]
+        else:
+            cuts[at], uppers[at] = cut[node], at + 1 + left[node + 1]
+            node += 1
+    return joints, cuts, uppers

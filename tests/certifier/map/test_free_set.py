@@ -1,0 +1,71 @@
+"""The free set of a map holds what its trees hold: at samples, each clause is proved where a tree of each of its pairs is."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from certifier.errors import ProofError
+from certifier.jobs.map import grow_map
+from certifier.map.free_set import OPEN, PROVED, free_set
+from certifier.model import WORLD
+from certifier.proof.map import MapProof
+from certifier.proof.partition import PLANE
+from certifier.proof.sub_scene import sub_scene
+from tests.certifier.scenes import box, planar_arm, two_arms
+
+CROWDED = box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 0.9, 0.0))
+
+
+def proved_by(proof: MapProof, s: np.ndarray) -> set[tuple[str, str]]:
+    """The pairs that have a plane at a configuration, read from the map's streams one node after the other."""
+    found = set()
+    for pairs, part in zip(proof.pairs, proof.maps, strict=True):
+        own = s[sub_scene(proof.scene, pairs).positions]
+        node, cut, skip = 0, 0, 0
+        while skip or part.nodes[node] >= 0:
+            inner = part.nodes[node] >= 0
+            if skip:
+                skip += 1 if inner else -1
+            elif own[part.nodes[node]] > part.cuts[cut]:
+                skip = 1
+            cut += inner
+            node += 1
+        if part.nodes[node] == PLANE:
+            found |= {(pair.a, pair.b) for pair in pairs}
+    return found
+
+
+def leaf(arrays: dict[str, np.ndarray], tree: int, q: np.ndarray) -> int:
+    node = arrays["root"][tree]
+    while arrays["joint"][node] >= 0:
+        node = arrays["upper"][node] if q[arrays["joint"][node]] > arrays["cut"][node] else node + 1
+    return int(arrays["joint"][node])
+
+
+@pytest.mark.parametrize("scene", [planar_arm(2, CROWDED), two_arms(2, apart=3.0)], ids=["arm", "two arms"])
+def test_each_clause_holds_where_the_trees_of_its_pairs_do(scene):
+    proof = grow_map(scene, 0.9, deadline_s=30).proof
+    arrays = free_set(proof)
+    clauses = json.loads(str(arrays["head"]))["clauses"]
+    assert sorted(tuple(pair) for pairs in clauses for pair in pairs) == sorted((pair.a, pair.b) for pair in scene.pairs)
+    rng, both = np.random.default_rng(0), set()
+    for q in rng.uniform(scene.q_lower, scene.q_upper, (500, scene.n)):
+        known = proved_by(proof, scene.to_s(q))
+        for number, pairs in enumerate(clauses):
+            trees = arrays["tree"][arrays["first"][number] : arrays["first"][number + 1]]
+            leaves = {leaf(arrays, tree, q) for tree in trees}
+            assert leaves <= {PROVED, OPEN}
+            assert all(((a, b) in known) == (PROVED in leaves) for a, b in pairs)
+            both.add(PROVED in leaves)
+    assert both == {True, False}
+    assert len(arrays["joint"]) < sum(len(part.nodes) for part in proof.maps)
+
+
+def test_a_map_without_a_cell_for_a_pair_has_no_free_set():
+    proof = grow_map(planar_arm(2, CROWDED), 1.0, deadline_s=0.0).proof
+    with pytest.raises(ProofError, match="no configuration is proved to be free") as error:
+        free_set(proof)
+    assert error.value.code == "not_covered"

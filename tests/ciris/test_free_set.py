@@ -1,0 +1,214 @@
+"""A free set says of configurations and straight motions what exact fractions say of its cells, and refuses what is no free set."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import sys
+from contextlib import suppress
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from certifier.errors import CirisError, RegionError
+from ciris import FreeSet
+
+N = 3
+LIMIT = 2.0
+PROVED, OPEN = -1, -2
+Leaf = tuple[list[Fraction], list[Fraction], bool]
+
+
+def grids(last: int) -> st.SearchStrategy[Any]:
+    """Joint positions on a grid, many of which are on cuts."""
+    return st.lists(st.integers(-last, last).map(lambda k: k / 8), min_size=N, max_size=N)
+
+
+trees = st.recursive(
+    st.sampled_from([PROVED, PROVED, OPEN]),
+    lambda parts: st.tuples(st.integers(0, N - 1), st.integers(-7, 7).map(lambda k: k / 4), parts, parts),
+    max_leaves=12,
+)
+clauses = st.lists(st.lists(trees, min_size=1, max_size=3), min_size=1, max_size=3)
+
+
+def within(tree: Any, lower: list[float], upper: list[float]) -> Any:
+    """The tree without the cuts that miss their cells."""
+    if isinstance(tree, int):
+        return tree
+    joint, cut, low, high = tree
+    if not lower[joint] < cut < upper[joint]:
+        return within(low, lower, upper)
+    middle = [cut if i == joint else None for i in range(N)]
+    below = [u if m is None else m for u, m in zip(upper, middle, strict=True)]
+    above = [u if m is None else m for u, m in zip(lower, middle, strict=True)]
+    return joint, cut, within(low, lower, below), within(high, above, upper)
+
+
+def leaves(tree: Any, lower: list[Fraction], upper: list[Fraction]) -> list[Leaf]:
+    if isinstance(tree, int):
+        return [(lower, upper, tree == PROVED)]
+    joint, cut, low, high = tree
+    below, above = upper.copy(), lower.copy()
+    below[joint] = above[joint] = Fraction(cut)
+    return leaves(low, lower, below) + leaves(high, above, upper)
+
+
+def written(path: Path, wanted: list[list[Any]], **changes: Any) -> Path:
+    """A file as ``ciris free-set`` writes them."""
+    joint, cut, upper, root, first, tree = [], [], [], [], [0], []
+
+    def add(node: Any) -> None:
+        at = len(joint)
+        joint.append(node if isinstance(node, int) else node[0])
+        cut.append(0.0 if isinstance(node, int) else node[1])
+        upper.append(0)
+        if not isinstance(node, int):
+            add(node[2])
+            upper[at] = len(joint)
+            add(node[3])
+
+    for members in wanted:
+        for node in members:
+            root.append(len(joint))
+            tree.append(len(tree))
+            add(node)
+        first.append(len(tree))
+    head = {
+        "format": 1,
+        "scene": "0" * 64,
+        "name": "cell",
+        "joints": ["a", "b", "c"],
+        "clauses": [[[f"a{i}", f"b{i}"]] for i in range(len(wanted))],
+    }
+    arrays = {
+        "q_star": np.zeros(N),
+        "q_lower": np.full(N, -LIMIT),
+        "q_upper": np.full(N, LIMIT),
+        "revolute": np.ones(N, bool),
+        "joint": np.array(joint, np.int16),
+        "cut": np.array(cut),
+        "upper": np.array(upper, np.int32),
+        "root": np.array(root, np.int32),
+        "first": np.array(first, np.int32),
+        "tree": np.array(tree, np.int32),
+    }
+    head |= changes.pop("head", {})
+    np.savez(path, head=np.array(json.dumps(head)), **(arrays | changes))
+    return path
+
+
+def free_at(cells: list[list[list[Leaf]]], q: list[Fraction]) -> bool:
+    """Whether every clause has a tree whose cells with q in them, their boundaries included, are all proved."""
+
+    def proved(boxes: list[Leaf]) -> bool:
+        return all(holds for lower, upper, holds in boxes if all(l <= x <= u for l, x, u in zip(lower, q, upper, strict=True)))
+
+    return all(any(proved(boxes) for boxes in members) for members in cells)
+
+
+def free_along(cells: list[list[list[Leaf]]], start: list[Fraction], end: list[Fraction]) -> bool:
+    """The same at each time at which a motion crosses a boundary, and between these times."""
+    times = {Fraction(0), Fraction(1)}
+    for members in cells:
+        for boxes in members:
+            for lower, upper, _ in boxes:
+                for a, b, ends in zip(start, end, zip(lower, upper, strict=True), strict=True):
+                    times |= {(v - a) / (b - a) for v in ends if a != b and 0 <= (v - a) / (b - a) <= 1}
+    ordered = sorted(times)
+    looked_at = ordered + [(t + u) / 2 for t, u in itertools.pairwise(ordered)]
+    return all(free_at(cells, [a + t * (b - a) for a, b in zip(start, end, strict=True)]) for t in looked_at)
+
+
+@settings(deadline=None, max_examples=150)
+@given(clauses, st.lists(st.tuples(grids(16), grids(16)), min_size=1, max_size=4))
+def test_it_says_what_exact_fractions_say(tmp_path_factory, drawn, motions) -> None:
+    lower, upper = [-LIMIT] * N, [LIMIT] * N
+    wanted = [[within(tree, lower, upper) for tree in members] for members in drawn]
+    found = FreeSet.load(written(tmp_path_factory.mktemp("free") / "cell.npz", wanted))
+    box = [Fraction(-2)] * N, [Fraction(2)] * N
+    cells = [[leaves(tree, *box) for tree in members] for members in wanted]
+    starts, ends = ([[Fraction(x) for x in motion[i]] for motion in motions] for i in (0, 1))
+    first, last = (np.array(motions)[:, i] for i in (0, 1))
+    assert found.contains(first).tolist() == [free_at(cells, q) for q in starts]
+    expected = [free_along(cells, a, b) for a, b in zip(starts, ends, strict=True)]
+    assert found.contains_motion(first, last).tolist() == expected
+    for a, b, free in zip(first, last, expected, strict=True):
+        parts = found.open_parts(a, b)
+        assert (parts == ()) == free
+        assert all(0 <= part.start <= part.end <= 1 for part in parts)
+
+
+def test_open_parts_say_where_and_between_which_bodies(tmp_path: Path) -> None:
+    narrow = (0, -0.5, PROVED, (0, 0.5, OPEN, PROVED))
+    found = FreeSet.load(written(tmp_path / "cell.npz", [[PROVED], [narrow]]))
+    (part,) = found.open_parts([-1.0, 0, 0], [1.0, 0, 0])
+    assert (part.start, part.end) == (pytest.approx(0.25, abs=1e-8), pytest.approx(0.75, abs=1e-8))
+    assert part.pairs == (("a1", "b1"),)
+    assert found.open_parts([-1.0, 0, 0], [-0.6, 0, 0]) == ()
+    assert found.contains([[-1.0, 0, 0], [0.0, 0, 0], [0.5, 0, 0], [0.5 + 1e-8, 0, 0]]).tolist() == [True, False, False, True]
+
+
+def test_nothing_beyond_the_limits_is_free(tmp_path: Path) -> None:
+    found = FreeSet.load(written(tmp_path / "cell.npz", [[PROVED]]))
+    assert found.contains([[2.0, 0, 0], [np.nextafter(2.0, 3), 0, 0]]).tolist() == [True, False]
+    assert not found.contains_motion([0, 0, 0], [0, 2.1, 0])
+    with pytest.raises(RegionError, match="the motion leaves the joint limits") as error:
+        found.open_parts([0, 0, 0], [0, 2.1, 0])
+    assert error.value.code == "outside_limits"
+
+
+def test_bad_questions_are_named(tmp_path: Path) -> None:
+    found = FreeSet.load(written(tmp_path / "cell.npz", [[PROVED]]))
+    for ask, code in (
+        (lambda: found.contains([0, 0]), "wrong_length"),
+        (lambda: found.contains([0, np.nan, 0]), "points"),
+        (lambda: found.contains_motion([[0, 0, 0]], [0, 0, 0]), "motion"),
+        (lambda: found.open_parts([[0, 0, 0]], [[0, 0, 0]]), "motion"),
+    ):
+        with pytest.raises(RegionError) as error:
+            ask()
+        assert error.value.code == code
+
+
+@settings(deadline=None, max_examples=150)
+@given(
+    st.sampled_from(["joint", "cut", "upper", "root", "first", "tree", "q_lower"]),
+    st.integers(0, 20),
+    st.sampled_from([-(2**15), -3, -1, 0, 1, 2, 5, 2**15 - 1]),
+    st.booleans(),
+)
+def test_arrays_that_lead_elsewhere_are_refused_or_harmless(tmp_path_factory, name, at, value, short) -> None:
+    tree = (0, 0.0, (1, 0.5, PROVED, OPEN), PROVED)
+    path = written(tmp_path_factory.mktemp("free") / "cell.npz", [[tree, tree], [PROVED]])
+    with np.load(path) as arrays:
+        kept = dict(arrays)
+    if short:
+        kept[name] = kept[name][: at % len(kept[name])]
+    else:
+        kept[name][at % len(kept[name])] = value
+    np.savez(path, **kept)
+    with suppress(CirisError):
+        found = FreeSet.load(path)
+        found.contains(np.zeros((2, N)))
+        found.contains_motion([[-1.0, -1, -1]], [[1.0, 1, 1]])
+
+
+def test_what_is_no_free_set_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text, empty = tmp_path / "text", tmp_path / "empty.npz"
+    text.write_text("nothing")
+    np.savez(empty, head=np.array("{}"))
+    newer = written(tmp_path / "newer.npz", [[PROVED]], head={"format": 2})
+    for path, code in ((tmp_path / "missing.npz", "no_file"), (text, "free_set"), (empty, "free_set"), (newer, "free_set")):
+        with pytest.raises(CirisError) as error:
+            FreeSet.load(path)
+        assert (error.value.code, error.value.field) == (code, str(path))
+    monkeypatch.setitem(sys.modules, "numba", None)
+    monkeypatch.delitem(sys.modules, "ciris.lookups", raising=False)
+    with pytest.raises(CirisError, match="numba is not installed"):
+        FreeSet.load(empty)
