@@ -5,8 +5,10 @@
 
 from __future__ import annotations
 
+import io
 import json
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -19,8 +21,24 @@ from ciris.space import Array, InSpace, Space, frozen
 
 FORMAT = 1
 TOLERANCE = 1e-9
-"""A configuration counts as open where it is nearer to an open cell than this, in radians or metres, in each joint. Where a joint has
-limits beyond 1, it is this part of them. The tolerance covers rounding errors."""
+"""A configuration counts as open within TOLERANCE of an open cell in each joint, in radians or metres. Where a joint's limits are beyond 1,
+TOLERANCE is a part of the larger one. This covers rounding errors."""
+LARGEST = 1 << 30
+"""No file is read that has more bytes than this, packed or unpacked."""
+DAMAGES = (
+    EOFError,
+    KeyError,
+    MemoryError,
+    NotImplementedError,
+    OSError,
+    RecursionError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What reading a damaged file may raise."""
 AGAIN = "make it again from the map's proof: ciris free-set PROOF"
 
 
@@ -37,7 +55,7 @@ class OpenPart:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FreeSet(InSpace):
-    """Configurations that are proved to be free of collision, but for the pairs that the proof is not about."""
+    """Configurations that are proved to be free of collision. Pairs that the scene ignores are not covered."""
 
     scene: str
     """Hash of the scene."""
@@ -53,32 +71,35 @@ class FreeSet(InSpace):
     def load(cls, path: str | Path) -> Self:
         """Reads what ``ciris free-set`` wrote. The file is no proof: it is as trustworthy as the place that it comes from.
 
+        It also asks each question once, so that what is compiled is there for the next ones.
+
         Raises:
-            CirisError: no_file; free_set, for a file that is none, is damaged, or is of another version; not_installed, without numba.
+            CirisError: no_file; free_set, for a file that is none, is damaged, or is of another version; not_installed, without numba;
+                no_cache, where numba finds no directory for what it compiles.
         """
         try:
-            from ciris.lookups import Cells
-        except ModuleNotFoundError as error:
-            raise CirisError("not_installed", f"{error.name} is not installed", hint="pip install 'ciris[monitor]'") from None
-        try:
-            with np.load(path, allow_pickle=False) as arrays:
-                head = json.loads(str(arrays["head"]))
-                if head["format"] != FORMAT:
-                    raise CirisError("free_set", f"it has the format {head['format']}, not {FORMAT}", field=str(path), hint=AGAIN)
-                joints = tuple(head["joints"])
-                space = Space(joints, *(frozen(arrays[key]) for key in ("q_star", "q_lower", "q_upper")), frozen(arrays["revolute"], bool))
-                limits = np.maximum(np.abs(space.q_lower), np.abs(space.q_upper))
-                types = {"joint": np.int16, "cut": float, "upper": np.int32, "root": np.int32, "first": np.int32, "tree": np.int32}
-                cells = Cells(
-                    **{key: np.array(arrays[key], dtype) for key, dtype in types.items()}, tolerance=TOLERANCE * np.maximum(limits, 1)
-                )
-                clauses = tuple(tuple((str(a), str(b)) for a, b in pairs) for pairs in head["clauses"])
-                found = cls(str(head["scene"]), str(head["name"]), space, clauses, cells)
-            found._check()
+            with open(path, "rb") as file:
+                data = file.read(LARGEST + 1)
         except OSError as error:
             raise CirisError("no_file", unreadable(error), field=str(path), hint="name the file that ciris free-set wrote") from None
-        except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
+        try:
+            from ciris import lookups
+        except ModuleNotFoundError as error:
+            raise CirisError("not_installed", f"{error.name} is not installed", hint="pip install 'ciris[monitor]'") from None
+        except RuntimeError as error:
+            hint = "set NUMBA_CACHE_DIR to a directory that this user may write to"
+            raise CirisError("no_cache", f"what is compiled cannot be kept: {error}", field="NUMBA_CACHE_DIR", hint=hint) from None
+        try:
+            head, arrays = _read(data)
+            if head["format"] != FORMAT:
+                raise CirisError("free_set", f"it has the format {head['format']!r}, not {FORMAT}", field=str(path), hint=AGAIN)
+            found = _checked(cls, head, arrays, lookups)
+        except DAMAGES:
             raise CirisError("free_set", "it is no free set, or is damaged", field=str(path), hint=AGAIN) from None
+        middle = (found.space.q_lower + found.space.q_upper) / 2
+        found.contains(middle)
+        found.contains_motion(middle, middle)
+        found.open_parts(middle, middle)
         return found
 
     def __repr__(self) -> str:
@@ -96,9 +117,11 @@ class FreeSet(InSpace):
 
         given = self.space.points(q, "q")
         rows = np.ascontiguousarray(given.reshape(-1, len(self.joints)))
-        found = np.empty(len(rows), bool)
-        points(self._cells, rows, found)
-        return (found & self._within(rows)).reshape(given.shape[:-1])
+        found = self._within(rows)
+        held = np.empty(np.count_nonzero(found), bool)
+        points(self._cells, rows[found], held)
+        found[found] = held
+        return found.reshape(given.shape[:-1])
 
     def contains_motion(self, start: ArrayLike, end: ArrayLike) -> NDArray[np.bool_]:
         """Returns which motions that are straight in q are proved to be free all along, (..., n) and (..., n) -> (...).
@@ -109,9 +132,12 @@ class FreeSet(InSpace):
         from ciris.lookups import motions
 
         first, rows, ends = self._ends(start, end)
-        found = np.empty(len(rows), bool)
-        motions(self._cells, rows, ends - rows, found)
-        return (found & self._within(rows) & self._within(ends)).reshape(first.shape[:-1])
+        found = self._within(rows)
+        found &= self._within(ends)
+        held = np.empty(np.count_nonzero(found), bool)
+        motions(self._cells, rows[found], ends[found] - rows[found], held)
+        found[found] = held
+        return found.reshape(first.shape[:-1])
 
     def open_parts(self, start: ArrayLike, end: ArrayLike) -> tuple[OpenPart, ...]:
         """Returns where a motion from one configuration straight to another, (n,) each, is not proved to be free, for each group of pairs.
@@ -124,9 +150,12 @@ class FreeSet(InSpace):
         first, rows, ends = self._ends(start, end)
         if first.ndim != 1:
             raise RegionError("motion", "these are several motions", field="start", hint="ask for one at a time")
-        if not (self._within(rows) & self._within(ends)).all():
-            hint = f"the limits are {self.space.q_lower.tolist()} and {self.space.q_upper.tolist()}"
-            raise RegionError("outside_limits", "the motion leaves the joint limits", field="start, end", hint=hint)
+        for field, (q,) in (("start", rows), ("end", ends)):
+            outside = np.flatnonzero((q < self.space.q_lower) | (q > self.space.q_upper))
+            if len(outside):
+                i = outside[0]
+                hint = f"its limits are {self.space.q_lower[i]:.6g} and {self.space.q_upper[i]:.6g}"
+                raise RegionError("outside_limits", f"{self.joints[i]} is {q[i]:.6g}, beyond its limits", field=field, hint=hint)
         parts = []
         for clause, pairs in enumerate(self.clauses):
             for begin, until in _joined(open_ranges(self._cells, clause, rows[0], ends[0] - rows[0])):
@@ -144,32 +173,57 @@ class FreeSet(InSpace):
         found: NDArray[np.bool_] = ((self.space.q_lower <= rows) & (rows <= self.space.q_upper)).all(axis=1)
         return found
 
-    def _check(self) -> None:
-        """Refuses arrays that compiled loops would read beyond their ends.
 
-        Raises:
-            ValueError: they are not what ``ciris free-set`` writes.
-        """
-        from ciris.lookups import DEPTH, OPEN, depth
+def _read(data: bytes) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    """Returns the head and the arrays of a file.
 
-        cells, n, N, space = self._cells, len(self.joints), len(self._cells.joint), self.space
-        shapes = [
-            *(array.shape == (n,) for array in (space.q_star, space.q_lower, space.q_upper, space.revolute)),
-            *(array.shape == (N,) for array in (cells.joint, cells.cut, cells.upper)),
-            *(array.ndim == 1 for array in (cells.root, cells.first, cells.tree)),
-            N > 0 and len(self.clauses) > 0 and len(cells.first) == 1 + len(self.clauses),
-        ]
-        if not all(shapes):
-            raise ValueError("the arrays have other shapes")
-        inner = np.flatnonzero(cells.joint >= 0)
-        values = [
-            ((cells.joint >= OPEN) & (cells.joint < n)).all() and np.isfinite(cells.cut).all(),
-            ((cells.upper[inner] > inner + 1) & (cells.upper[inner] < N)).all(),
-            cells.first[0] == 0 and (np.diff(cells.first) > 0).all() and cells.first[-1] == len(cells.tree),
-            ((cells.tree >= 0) & (cells.tree < len(cells.root))).all() and ((cells.root >= 0) & (cells.root < N)).all(),
-        ]
-        if not all(values) or depth(cells.joint, cells.upper) > DEPTH:
-            raise ValueError("the arrays do not fit each other")
+    Raises:
+        ValueError: it is too large; or another one of DAMAGES.
+    """
+    with zipfile.ZipFile(io.BytesIO(data)) as parts:
+        if sum(part.file_size for part in parts.infolist()) > LARGEST:
+            raise ValueError("it is too large")
+    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+        found = {name: arrays[name] for name in arrays.files}
+    head = json.loads(str(found.pop("head")))
+    if not isinstance(head, dict):
+        raise TypeError("the head is no object")
+    return head, found
+
+
+def _checked(cls: type[FreeSet], head: dict[str, Any], arrays: dict[str, NDArray[Any]], lookups: Any) -> Any:
+    """Returns the free set of what was read, after a check that compiled loops stay within the arrays, and end.
+
+    Raises:
+        ValueError: the arrays are not what ``ciris free-set`` writes; or another one of DAMAGES.
+    """
+    joints, clauses = head["joints"], tuple(tuple((str(a), str(b)) for a, b in pairs) for pairs in head["clauses"])
+    n, N = len(joints), len(arrays["joint"])
+    of_joints = dict.fromkeys(("q_star", "q_lower", "q_upper"), ((n,), "float64")) | {"revolute": ((n,), "bool")}
+    of_nodes = {"joint": ((N,), "int16"), "cut": ((N,), "float64"), "upper": ((N,), "int32")}
+    of_trees = {name: ((len(arrays[name]),), "int32") for name in ("root", "first", "tree")}
+    shapes = of_joints | of_nodes | of_trees
+    if {name: (array.shape, array.dtype.name) for name, array in arrays.items()} != shapes or not n or not N:
+        raise ValueError("the arrays have other types or shapes")
+    arrays = {name: frozen(array, array.dtype) for name, array in arrays.items()}
+    space = Space(tuple(joints), arrays["q_star"], arrays["q_lower"], arrays["q_upper"], arrays["revolute"])
+    tolerance = frozen(TOLERANCE * np.maximum(np.maximum(np.abs(space.q_lower), np.abs(space.q_upper)), 1))
+    cells = lookups.Cells(*(arrays[name] for name in lookups.Cells._fields[:-1]), tolerance)
+    inner = np.flatnonzero(cells.joint >= 0)
+    parts = np.concatenate([inner + 1, cells.upper[inner], cells.root])
+    fits = [
+        all(isinstance(joint, str) for joint in joints),
+        np.isfinite(space.q_star).all() and np.isfinite(tolerance).all() and (space.q_lower <= space.q_upper).all(),
+        (cells.joint >= lookups.OPEN).all() and (cells.joint < n).all() and np.isfinite(cells.cut).all(),
+        (cells.upper[inner] > inner + 1).all() and (cells.upper[inner] < N).all(),
+        # Each node is the root of a tree, or a part of one other node. So these are trees.
+        len(parts) == N and len(np.unique(parts)) == N and (parts >= 0).all() and (parts < N).all(),
+        len(cells.first) == 1 + len(clauses) > 1 and cells.first[0] == 0 and cells.first[-1] == len(cells.tree),
+        (cells.first[1:] > cells.first[:-1]).all() and (cells.tree >= 0).all() and (cells.tree < len(cells.root)).all(),
+    ]
+    if not all(fits) or lookups.depth(cells.joint, cells.upper) > lookups.DEPTH:
+        raise ValueError("the arrays do not fit each other")
+    return cls(str(head["scene"]), str(head["name"]), space, clauses, cells)
 
 
 def _joined(ranges: Array) -> list[tuple[float, float]]:

@@ -46,7 +46,7 @@ class Cells(NamedTuple):
     tolerance: Floats
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def points(cells: Cells, X: Floats, found: NDArray[np.bool_]) -> None:
     """Fills in which configurations (m, n) are free. All of them are looked up in one tree after the other, which stays in the cache."""
     stack, room, still = _stack(), np.empty((2, ROOM, 2)), np.zeros(X.shape[1])
@@ -84,7 +84,7 @@ def _leaf(cells: Cells, root: int, x: Floats) -> tuple[int, bool]:
     return j, near
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def motions(cells: Cells, X: Floats, dX: Floats, found: NDArray[np.bool_]) -> None:
     """Fills in which motions (m, n) are free all along."""
     stack, room, clauses = _stack(), np.empty((2, ROOM, 2)), len(cells.first) - 1

@@ -22,13 +22,11 @@ def write(args: Namespace) -> int:
     Raises:
         CirisError: the map cannot be read or does not hold, no configuration of it is free, or the file cannot be written.
     """
-    check_writable(args.out)
+    out = args.out or f"{file_name(Path(args.proof).stem)}.free.npz"
+    check_writable(out)
     with readable(Path(args.proof)) as path:
         found = _found(path, args.proof)
-    out = args.out or f"{file_name(found['name'])}.free.npz"
-    if args.out is None:
-        check_writable(out)
-    written = ProofFile(out).write(found["name"], base64.b64decode(found.pop("file")))
+    written = ProofFile(out).write(found["name"], base64.b64decode(found.pop("free_set")))
     if args.json:
         output.print_json({**found, "file": str(written)})
     else:

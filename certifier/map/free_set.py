@@ -36,7 +36,7 @@ def of_file(payload: dict[str, Any]) -> dict[str, Any]:
         payload: ``path`` of the map and ``processes``.
 
     Returns:
-        The ``file`` in base 64, the ``name`` of the scene, and numbers of ``nodes`` and of proved ``cells``.
+        The ``free_set`` as a file, in base 64, the ``name`` of the scene, and numbers of ``nodes`` and of proved ``cells``.
 
     Raises:
         CirisError: no_file.
@@ -48,22 +48,24 @@ def of_file(payload: dict[str, Any]) -> dict[str, Any]:
     arrays, written = free_set(proof), io.BytesIO()
     np.savez_compressed(written, **arrays)
     file = base64.b64encode(written.getvalue()).decode()
-    return {"name": proof.scene.name, "cells": statement.cells, "nodes": len(arrays["joint"]), "file": file}
+    return {"name": proof.scene.name, "cells": statement.cells, "nodes": len(arrays["joint"]), "free_set": file}
 
 
-def free_set(proof: MapProof) -> dict[str, np.ndarray]:
+def free_set(proof: MapProof) -> dict[str, Any]:
     """Returns the arrays of a verified map's free set, as ciris.lookups.Cells names them, and a ``head`` as JSON.
 
     Raises:
-        ProofError: not_covered, where a pair has no tree with a proved cell, so that no configuration is free.
+        ProofError: no_pairs, for a scene without pairs; not_covered, where a pair has no proved cell, so that no configuration is free.
     """
     scene = proof.scene
-    trees = [_tree(scene, pairs, part) for pairs, part in zip(proof.pairs, proof.maps, strict=True)]
+    if not scene.pairs:
+        raise ProofError("no_pairs", "the scene has no pairs of bodies, so nothing can collide", field="scene", hint="it needs no free set")
+    kept = [(pairs, part) for pairs, part in zip(proof.pairs, proof.maps, strict=True) if (part.nodes == PLANE).any()]
+    trees = [_tree(scene, pairs, part) for pairs, part in kept]
     about: dict[Pair, list[int]] = {pair: [] for pair in scene.pairs}
-    for number, pairs in enumerate(proof.pairs):
-        if (proof.maps[number].nodes == PLANE).any():
-            for pair in pairs:
-                about[pair].append(number)
+    for number, (pairs, _) in enumerate(kept):
+        for pair in pairs:
+            about[pair].append(number)
     alone = next((pair for pair, numbers in about.items() if not numbers), None)
     if alone is not None:
         message = f"{alone.a} and {alone.b} have no proved cell, so no configuration is proved to be free"
@@ -100,7 +102,7 @@ def _tree(scene: Scene, pairs: Sequence[Pair], part: PairMap) -> tuple[np.ndarra
     """Returns the joint, the cut in q and the upper part of each node of a tree. Parts that are alike all over become one leaf."""
     positions, inner = sub_scene(scene, pairs).positions, part.nodes >= 0
     joints = np.where(part.nodes == PLANE, PROVED, OPEN).astype(np.int16)
-    joints[inner] = positions[part.nodes[inner]] if inner.any() else 0
+    joints[inner] = positions[part.nodes[inner]]
     s = np.zeros((len(part.cuts), scene.n))
     of_cuts = np.arange(len(s)), joints[inner]
     s[of_cuts] = part.cuts

@@ -106,7 +106,7 @@ def add(verbs: Any) -> None:
 
     free_set = verbs.add_parser("free-set", parents=[as_json()], help="check a map's proof, and write its cells for quick lookups")
     free_set.add_argument("proof", metavar="PROOF", help="the proof file of a map")
-    free_set.add_argument("--out", metavar="FILE", help="new file to write; default: one in this directory, named after the scene")
+    free_set.add_argument("--out", metavar="FILE", help="new file to write; default: one in this directory, named after PROOF")
     free_set.set_defaults(run="client.free_set:write")
 
     clearance = verbs.add_parser(

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import agreement, catalogue, compare, growth, path, query, recertify, report, service, store, survey
+from benchmarks import agreement, catalogue, compare, growth, maps, path, query, recertify, report, service, store, survey
 from benchmarks.compare import Verdict, verdict
 from benchmarks.ompl import Ompl
 from certifier.carry.robot import same_bodies
@@ -251,6 +251,17 @@ def test_questions_about_many_regions_are_measured_beside_a_plain_product() -> N
     assert 60 * 50 <= row["faces"] <= 60 * 600
     assert all(value > 0 for value in row.values())
     assert "plain product, 1 point" in report.text(document)
+
+
+def test_a_map_is_measured_with_what_it_connects(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(maps, "COVERAGE", 0.9)
+    document = maps.maps(["planar_2dof"], 20.0, lambda _: None)
+    (row,) = document["rows"]
+    assert row["coverage"]["value"] >= 0.9
+    assert row["over_time"][-1][1] == row["coverage"]["value"]
+    assert [at for at, _ in row["over_time"]] == sorted(at for at, _ in row["over_time"])
+    assert 0 < row["straight"] < row["connected"] < 1
+    assert "planar_2dof" in report.text(document)
 
 
 @pytest.mark.slow

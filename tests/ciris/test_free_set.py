@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import subprocess
 import sys
 from contextlib import suppress
 from fractions import Fraction
@@ -15,8 +16,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import ciris.free_set
 from certifier.errors import CirisError, RegionError
-from ciris import FreeSet
+from certifier.map import free_set
+from certifier.proof import limits
+from ciris import FreeSet, lookups
 
 N = 3
 LIMIT = 2.0
@@ -158,9 +162,23 @@ def test_nothing_beyond_the_limits_is_free(tmp_path: Path) -> None:
     found = FreeSet.load(written(tmp_path / "cell.npz", [[PROVED]]))
     assert found.contains([[2.0, 0, 0], [np.nextafter(2.0, 3), 0, 0]]).tolist() == [True, False]
     assert not found.contains_motion([0, 0, 0], [0, 2.1, 0])
-    with pytest.raises(RegionError, match="the motion leaves the joint limits") as error:
+    assert not found.contains_motion(np.full(N, 1e308), np.full(N, -1e308))
+    with pytest.raises(RegionError, match=r"b is 2\.1, beyond its limits") as error:
         found.open_parts([0, 0, 0], [0, 2.1, 0])
-    assert error.value.code == "outside_limits"
+    assert (error.value.code, error.value.field) == ("outside_limits", "end")
+
+
+def test_a_motion_may_cross_many_cells(tmp_path: Path) -> None:
+    cuts = np.linspace(-1.9, 1.9, 200).tolist()
+    comb: Any = PROVED
+    for i, cut in reversed(list(enumerate(cuts))):
+        comb = (0, cut, OPEN if i % 2 else PROVED, comb)
+    found = FreeSet.load(written(tmp_path / "cell.npz", [[comb], [comb, PROVED]]))
+    for start, end in (([-2.0, 0, 0], [2.0, 0, 0]), ([2.0, 0, 0], [-2.0, 0, 0])):
+        parts = found.open_parts(start, end)
+        assert len(parts) == 100
+        assert all(part.pairs == (("a0", "b0"),) for part in parts)
+        assert sum(part.end - part.start for part in parts) == pytest.approx(100 * (cuts[1] - cuts[0]) / 4, abs=1e-6)
 
 
 def test_bad_questions_are_named(tmp_path: Path) -> None:
@@ -180,7 +198,7 @@ def test_bad_questions_are_named(tmp_path: Path) -> None:
 @given(
     st.sampled_from(["joint", "cut", "upper", "root", "first", "tree", "q_lower"]),
     st.integers(0, 20),
-    st.sampled_from([-(2**15), -3, -1, 0, 1, 2, 5, 2**15 - 1]),
+    st.sampled_from([-(2**31), -(2**15), -3, -1, 0, 1, 2, 5, 2**15 - 1, 2**31 - 1]),
     st.booleans(),
 )
 def test_arrays_that_lead_elsewhere_are_refused_or_harmless(tmp_path_factory, name, at, value, short) -> None:
@@ -191,12 +209,64 @@ def test_arrays_that_lead_elsewhere_are_refused_or_harmless(tmp_path_factory, na
     if short:
         kept[name] = kept[name][: at % len(kept[name])]
     else:
-        kept[name][at % len(kept[name])] = value
+        largest = np.iinfo(np.int16 if name == "joint" else np.int32)
+        kept[name][at % len(kept[name])] = np.clip(value, largest.min, largest.max)
     np.savez(path, **kept)
     with suppress(CirisError):
         found = FreeSet.load(path)
         found.contains(np.zeros((2, N)))
         found.contains_motion([[-1.0, -1, -1]], [[1.0, 1, 1]])
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.integers(0, 10**6), st.integers(0, 255), st.booleans())
+def test_a_damaged_file_is_named_or_says_the_same(tmp_path_factory, at, value, short) -> None:
+    path = written(tmp_path_factory.mktemp("free") / "cell.npz", [[(0, 0.0, (1, 0.5, PROVED, OPEN), PROVED)], [PROVED]])
+    with np.load(path) as arrays:
+        np.savez_compressed(path, **arrays)
+    data = bytearray(path.read_bytes())
+    data[at % len(data)] = value
+    path.write_bytes(data[: at % len(data)] if short else data)
+    try:
+        found = FreeSet.load(path)
+    except CirisError as error:
+        told = error.code
+    else:
+        told = found.contains([[-1.0, 1, 0], [1.0, 1, 0]]).tolist()
+    assert told in ("free_set", [False, True])
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"first": np.array([0, 2**31 - 1, 2 - 2**31, 3], np.int32)},
+        {"joint": np.array([65535] * 3)},
+        {"root": np.array([0, 0, 0], np.int32)},
+        {"q_lower": np.full(N, np.nan)},
+        {"q_lower": np.full(N, 3.0)},
+        {"more": np.zeros(1)},
+        {"head": {"joints": [1, 2, 3]}},
+        {"head": {"clauses": []}},
+    ],
+    ids=lambda changes: "-".join(changes),
+)
+def test_what_loops_would_read_beyond_its_end_is_refused(tmp_path: Path, changes: dict[str, Any]) -> None:
+    path = written(tmp_path / "cell.npz", [[PROVED], [PROVED], [PROVED]], **changes)
+    with pytest.raises(CirisError) as error:
+        FreeSet.load(path)
+    assert error.value.code == "free_set"
+
+
+def test_nodes_that_two_others_share_are_no_tree(tmp_path: Path) -> None:
+    joint, upper = np.array([0, 0, PROVED, OPEN], np.int16), np.array([2, 3, 0, 0], np.int32)
+    path = written(tmp_path / "cell.npz", [[PROVED]], joint=joint, upper=upper, cut=np.zeros(4))
+    with pytest.raises(CirisError, match="damaged"):
+        FreeSet.load(path)
+
+
+def test_the_file_means_the_same_to_those_who_write_and_read_it() -> None:
+    wanted = (free_set.FORMAT, free_set.PROVED, free_set.OPEN, limits.CUT_DEPTH)
+    assert wanted == (ciris.free_set.FORMAT, lookups.PROVED, lookups.OPEN, lookups.DEPTH)
 
 
 def test_what_is_no_free_set_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -209,6 +279,19 @@ def test_what_is_no_free_set_is_named(tmp_path: Path, monkeypatch: pytest.Monkey
             FreeSet.load(path)
         assert (error.value.code, error.value.field) == (code, str(path))
     monkeypatch.setitem(sys.modules, "numba", None)
-    monkeypatch.delitem(sys.modules, "ciris.lookups", raising=False)
+    monkeypatch.delitem(sys.modules, "ciris.lookups")
+    monkeypatch.delattr(ciris, "lookups")
     with pytest.raises(CirisError, match="numba is not installed"):
         FreeSet.load(empty)
+
+
+def test_no_place_for_what_is_compiled_is_named(tmp_path: Path) -> None:
+    path = written(tmp_path / "cell.npz", [[PROVED]])
+    program = (
+        "import numba.core.caching as caching\n"
+        "for locator in caching.CacheImpl._locator_classes: locator.from_function = classmethod(lambda *_: None)\n"
+        f"import ciris\ntry: ciris.FreeSet.load({str(path)!r})\n"
+        "except ciris.CirisError as error: print(error.code, error.hint)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("no_cache set NUMBA_CACHE_DIR")

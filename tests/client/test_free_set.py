@@ -17,7 +17,7 @@ def test_drake_finds_no_collision_in_the_free_set_of_a_map(ciris: Ciris) -> None
     assert ciris("map", PLANAR, "--local", "--coverage", "0.9", "--out", "planar.proof").status == 0
     done = ciris("free-set", "planar.proof")
     assert (done.status, "read it: ciris.FreeSet.load" in done.stdout) == (0, True)
-    found = FreeSet.load("planar-2dof.free.npz")
+    found = FreeSet.load("planar.free.npz")
     rng, distances = np.random.default_rng(0), Distances(Path(PLANAR))
     q = rng.uniform(found.space.q_lower, found.space.q_upper, (SAMPLES, 2))
     drawn = distances.order(found.joints)
@@ -40,11 +40,12 @@ def test_programs_can_read_it_and_bad_files_are_named(ciris: Ciris, tmp_path: Pa
     data = bytearray((tmp_path / "planar.proof").read_bytes())
     data[len(data) // 2] ^= 1
     (tmp_path / "damaged.proof").write_bytes(data)
-    ciris("map", PLANAR, "--local", "--coverage", "1", "--deadline", "0.01", "--out", "empty.proof")
+    (tmp_path / "a.free.npz").write_text("precious")
     for arguments, words in (
         (("missing.proof",), "missing.proof"),
         (("damaged.proof",), "damaged.proof"),
         (("planar.proof", "--out", "a.npz"), "--out"),
+        (("a.proof",), "a.free.npz is there already"),
         (("planar.proof", "--out", "."), "--out"),
     ):
         done = ciris("free-set", *arguments)

@@ -18,7 +18,7 @@ THIRD_PARTIES = {
     "db": {"alembic", "cryptography", "numpy", "opentelemetry", "pydantic", "pydantic_settings", "sqlalchemy", "structlog"},
     "jobs": {"cachetools", "numpy", "pydantic", "pydantic_core", "sqlalchemy"},
     "planner": {"flint", "numba", "numpy", "ompl", "pydrake", "scipy"},
-    "ciris": {"httpx2", "numpy"},
+    "ciris": {"httpx2", "numba", "numpy"},
     "client": {"flint", "httpx2", "numpy", "pydrake", "yaml"},
     "dashboard": set(),
 }

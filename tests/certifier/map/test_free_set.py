@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -69,3 +70,10 @@ def test_a_map_without_a_cell_for_a_pair_has_no_free_set():
     with pytest.raises(ProofError, match="no configuration is proved to be free") as error:
         free_set(proof)
     assert error.value.code == "not_covered"
+
+
+def test_a_scene_without_pairs_has_no_free_set():
+    scene = replace(planar_arm(2, CROWDED), pairs=())
+    with pytest.raises(ProofError) as error:
+        free_set(MapProof(scene, (), ()))
+    assert error.value.code == "no_pairs"
