@@ -170,8 +170,7 @@ class FreeSet(InSpace):
         return first, np.ascontiguousarray(first.reshape(-1, n)), np.ascontiguousarray(second.reshape(-1, n))
 
     def _within(self, rows: Array) -> NDArray[np.bool_]:
-        found: NDArray[np.bool_] = ((self.space.q_lower <= rows) & (rows <= self.space.q_upper)).all(axis=1)
-        return found
+        return np.asarray(((self.space.q_lower <= rows) & (rows <= self.space.q_upper)).all(axis=1))
 
 
 def _read(data: bytes) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
