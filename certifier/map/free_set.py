@@ -117,12 +117,10 @@ def _smallest(joint: np.ndarray, cut: Array) -> tuple[np.ndarray, Array, np.ndar
     N = len(joint)
     kind, size, left = joint.copy(), np.ones(N, np.int32), np.ones(N, np.int32)
     waiting, top = np.empty(N, np.int32), 0
-    upper_of = np.zeros(N, np.int32)
     for node in range(N - 1, -1, -1):
         if joint[node] >= 0:
             lower, upper = waiting[top - 1], waiting[top - 2]
             top -= 2
-            upper_of[node] = upper
             size[node] = 1 + size[lower] + size[upper]
             left[node] = 1 + left[lower] + left[upper]
             if kind[lower] < 0 and kind[lower] == kind[upper]:
