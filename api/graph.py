@@ -15,7 +15,7 @@ from planner.library import Library
 from planner.overlap import compare, components, gap
 
 COMPARE_SECONDS = 5.0
-"""One request compares regions for about so long."""
+"""One request compares regions for about this many seconds."""
 MOST_GAPS = 20
 """Gaps are looked for around at most this many components, the largest."""
 

@@ -202,7 +202,7 @@ def _parser() -> ArgumentParser:
     mapped = kinds.add_parser("map", parents=[as_json], help="grow maps, look configurations and motions up in them, and connect some")
     mapped.add_argument("scenes", nargs="*", metavar="EXAMPLE", default=list(maps.SCENES), help=f"default: {', '.join(maps.SCENES)}")
     mapped.add_argument(
-        "--limit", type=float, default=maps.LIMIT, metavar="SECONDS", help=f"each map ends after so long; default {maps.LIMIT:g}"
+        "--limit", type=float, default=maps.LIMIT, metavar="SECONDS", help=f"each map ends at this many seconds; default {maps.LIMIT:g}"
     )
 
     changed = kinds.add_parser("recertify", parents=[as_json], help="certify regions again whose scenes have changed, and grow them anew")
@@ -210,7 +210,11 @@ def _parser() -> ArgumentParser:
         "scenes", nargs="*", metavar="EXAMPLE", default=list(recertify.SCENES), help=f"default: {', '.join(recertify.SCENES)}"
     )
     changed.add_argument(
-        "--limit", type=float, default=recertify.LIMIT, metavar="SECONDS", help=f"growing ends after so long; default {recertify.LIMIT:g}"
+        "--limit",
+        type=float,
+        default=recertify.LIMIT,
+        metavar="SECONDS",
+        help=f"growth ends at this many seconds; default {recertify.LIMIT:g}",
     )
     kinds.add_parser("docs", help="write the tables of docs/benchmarks.md from docs/benchmarks/*.json")
     return parser

@@ -90,7 +90,6 @@ def _asked(scene: Scene, free: FreeSet) -> dict[str, Any]:
     asked, others = drawn[: 2 * QUERIES], drawn[2 * QUERIES :]
     nodes = others[free.contains(others)]
     start, end = nodes[: len(nodes) // 2], nodes[len(nodes) // 2 :][: len(nodes) // 2]
-    free.contains_motion(start, end)
     batch = nodes[np.arange(BATCH) % len(nodes)]
     return {
         "point_seconds": _quantiles([partial(free.contains, q) for q in nodes[:SINGLE]]),
@@ -103,9 +102,9 @@ def _asked(scene: Scene, free: FreeSet) -> dict[str, Any]:
 
 def _connected(free: FreeSet, nodes: Array, asked: Array) -> float:
     """Returns the share of pairs of configurations that motions through the nodes connect, each of them proved."""
-    everything = np.concatenate([nodes, asked[free.contains(asked)]])
-    number = np.full(len(asked), -1)
-    number[free.contains(asked)] = len(nodes) + np.arange(len(everything) - len(nodes))
+    inside = free.contains(asked)
+    everything = np.concatenate([nodes, asked[inside]])
+    number = np.where(inside, len(nodes) + np.cumsum(inside) - 1, -1)
     near = KDTree(everything).query(everything, NEAREST + 1)[1][:, 1:]
     a, b = np.repeat(np.arange(len(everything)), NEAREST), near.ravel()
     held = free.contains_motion(everything[a], everything[b])

@@ -410,27 +410,15 @@ def _recertify(document: Document) -> list[str]:
 
 def _map(document: Document) -> list[str]:
     """Returns a table with one line for each scene."""
-    header = [
-        "example",
-        "pairs",
-        "covered",
-        "cells",
-        "proof",
-        "verify",
-        "free set",
-        "point",
-        "1000 points",
-        "motion",
-        "straight",
-        "connected",
-    ]
+    sizes_and_costs = ["cells", "proof", "verify", "free set", "point", "1000 points", "motion"]
+    header = ["example", "pairs", "covered", *sizes_and_costs, "straight", "connected"]
     rows = []
     for row in document["rows"]:
         over_time = ", ".join(f"{share:.2f} after {seconds(at)}" for at, share in row["over_time"])
         sizes = [f"{row['proof_bytes'] / 1e6:.2f} MB", seconds(row["verify_seconds"]), f"{row['free_set_bytes'] / 1e3:.0f} kB"]
         costs = [f"{1e6 * row[what]['p99']:.0f} us" for what in ("point_seconds", "batch_seconds", "motion_seconds")]
-        rows.append([row["example"], str(row["pairs"]), over_time, str(row["cells"]), *sizes, *costs])
-        rows[-1] += [f"{row['straight']:.2f}", f"{row['connected']:.2f}"]
+        shares = [f"{row[what]:.2f}" for what in ("straight", "connected")]
+        rows.append([row["example"], str(row["pairs"]), over_time, str(row["cells"]), *sizes, *costs, *shares])
     return [_table(header, rows)]
 
 

@@ -100,7 +100,7 @@ def _milliseconds(database: Database) -> dict[str, float]:
 
 
 def _settle(database: Database, seconds: float) -> _Piece:
-    """Claims pairs that are expected to take so long together, looks after them once, and saves them as certified."""
+    """Claims pairs that are expected to take this many seconds together, looks after them once, and saves them as certified."""
     start = time.perf_counter()
     with database.read() as session:
         job_id = work.next_job(session)

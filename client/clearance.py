@@ -4,20 +4,15 @@ from __future__ import annotations
 
 import base64
 from argparse import Namespace
-from pathlib import Path
 from typing import Any
 
-from certifier.errors import CirisError
-from certifier.isolation.child import run_in_child
 from certifier.names import escaped
 from certifier.verify.decimals import at_least_mm
 from client import output
-from client.cores import cores
 from client.files import ProofFile, check_writable
-from client.verify import MEMORY_BYTES, readable
+from client.verify import in_child
 
 TIGHT, NOT_TIGHT = 0, 1
-TIMEOUT_S = 3600.0
 
 
 def clearance(args: Namespace) -> int:
@@ -30,8 +25,7 @@ def clearance(args: Namespace) -> int:
     if args.out is not None:
         check_writable(args.out)
         kept = ProofFile(args.out)
-    with readable(Path(args.proof)) as path:
-        found = _found(path, args.proof)
+    found = in_child("certifier.jobs.clearance:clearance_in_child", args.proof)
     proof = found.pop("proof")
     written = None if kept is None or proof is None else str(kept.write(found["scene"]["name"], base64.b64decode(proof)))
     if args.json:
@@ -39,19 +33,6 @@ def clearance(args: Namespace) -> int:
     else:
         _print(found, written, proved_by_region=proof is None)
     return TIGHT if found["tight"] else NOT_TIGHT
-
-
-def _found(path: Path, name: str) -> dict[str, Any]:
-    """Returns what certifier.jobs.clearance says of the file at a path, of which users know the name."""
-    payload = {"path": str(path.absolute()), "processes": cores()}
-    try:
-        found: dict[str, Any] = run_in_child(
-            "certifier.jobs.clearance:clearance_in_child", payload, timeout_s=TIMEOUT_S, memory_bytes=MEMORY_BYTES
-        )
-    except CirisError as error:
-        error.field = escaped(name)
-        raise
-    return found
 
 
 def _print(found: dict[str, Any], written: str | None, proved_by_region: bool) -> None:

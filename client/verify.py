@@ -51,6 +51,22 @@ def verify(args: Namespace) -> int:
     return DOES_NOT
 
 
+def in_child(function: str, proof: str) -> dict[str, Any]:
+    """Returns what a function says of a proof file. It runs in a child process, and gets the file's ``path`` and a number of ``processes``.
+
+    Raises:
+        CirisError: what the function raises, with the proof's name as users know it.
+    """
+    with readable(Path(proof)) as path:
+        payload = {"path": str(path.absolute()), "processes": cores()}
+        try:
+            found: dict[str, Any] = run_in_child(function, payload, timeout_s=TIMEOUT_S, memory_bytes=MEMORY_BYTES)
+        except CirisError as error:
+            error.field = escaped(proof)
+            raise
+    return found
+
+
 @contextmanager
 def readable(path: Path) -> Iterator[Path]:
     """Yields a path at which a child process finds the proof: the file itself, or a copy of what comes from a pipe.

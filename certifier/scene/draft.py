@@ -321,7 +321,7 @@ def _fix(held: Mapping[str, Any]) -> list[str]:
 
 @contextmanager
 def _scene_file(text: str, directory: Path) -> Iterator[Path]:
-    """Yields a scene file with this text, which is there for so long."""
+    """Yields a scene file with this text, which is there until the block ends."""
     path = directory / f".draft-{secrets.token_hex(8)}.yaml"
     try:  # the name is known before the file is there: whatever signal comes, the file goes
         path.write_text(text, encoding="utf-8")

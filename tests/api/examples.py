@@ -85,9 +85,9 @@ SELDOM: dict[str, dict[str, Any]] = {
 }
 """What a short visit does not meet. The tests check it against the schemas, like the rest."""
 MOST, NUMBERS = 4, 16
-"""Lists are cut off after so many entries, lists of numbers after so many."""
+"""Lists are cut off after the first number of entries, lists of numbers after the second."""
 TEXT = 300
-"""So are texts after so many characters."""
+"""Texts are cut off after this many characters."""
 
 
 def shortened(value: Any) -> Any:

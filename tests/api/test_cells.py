@@ -206,7 +206,7 @@ BOX = ProvedBox(np.zeros(1), np.ones(1), np.array([[0.0, 0.0, 0.0, 1.0]]), np.ar
 
 
 def begin(database: Database, job: JobRow, index: int, parts: dict[int, int], reuse: dict[int, int] | None = None) -> pairs.Claim:
-    """Claims all of a further iteration, in which pairs have so many parts."""
+    """Claims all of a further iteration, in which pairs have this many parts."""
     new = [pairs.NewPair(i, f"a{i}", f"b{i}", 0.01, part) for i, count in parts.items() for part in range(count)]
     more: dict[str, Any] = {"box": BOX, "begun": dict.fromkeys(parts, 0) if index else {}, "cells": 100, "parts": parts}
     with database.write() as session:

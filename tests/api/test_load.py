@@ -158,7 +158,7 @@ def test_two_hundred_clients_while_the_workers_compute(service: tuple[str, list[
 
 WRITERS = 8
 HELD_SECONDS, FREE_SECONDS = 5.0, 0.5
-"""Somebody holds SQLite's lock so long, then lets the writers have it for so long, again and again."""
+"""Somebody holds SQLite's lock for a time, then lets the writers have it for another time, again and again."""
 
 
 @contextmanager

@@ -20,7 +20,7 @@ WAITING = 30
 
 
 async def _while_writers_wait(database: Database, url: str, region: str, key: str) -> tuple[list[float], list[int], list[int]]:
-    """Returns the seconds and statuses of reading while so many requests that write wait, and the statuses of these."""
+    """Returns the seconds and statuses of reading while this many requests to write wait, and the statuses of these."""
     headers = {"Authorization": f"Bearer {key}"}
     request = {"kind": "certify", "scene": "slider", "polytope": {"C": [[1.0]], "d": [0.1]}}
     async with httpx2.AsyncClient(base_url=url, headers=headers, timeout=30.0) as client:

@@ -50,7 +50,7 @@ def certified() -> PairResult:
 
 
 def too_close(scene: Scene, leaves: int) -> PairResult:
-    """A pair that is not certified, with so many cells and the configuration at which it is nearest."""
+    """A pair that is not certified, with this many cells and the configuration at which it is nearest."""
     return replace(left_open(scene, leaves), outcome=Outcome.TOO_CLOSE, detail="0.001 m apart", witness_s=np.array([0.4]))
 
 

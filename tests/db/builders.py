@@ -40,7 +40,7 @@ def a_running_job(session: Session, pair_count: int = 4, *, failures: int | None
 
 
 def add_pairs(session: Session, job: JobRow, pair_count: int, *, failures: int | None = 1) -> None:
-    """Iteration 0 with so many open pairs of 1 s each."""
+    """Iteration 0 with this many open pairs of 1 s each."""
     new = [pairs.NewPair(i, f"a{i}", f"b{i}", 1.0) for i in range(pair_count)]
     add_iteration(session, job, index=0, label="contract", C=[[1.0], [-1.0]], d=[1.0, 1.0], center=[0.0], pairs=new, failures=failures)
 

@@ -44,7 +44,7 @@ def _read(session: Session) -> int:
 
 
 def efforts(db: Database, pair_count: int, settled: int, counted: bool = False) -> dict[str, int]:
-    """The efforts for one pair of a job with so many pairs, so many of them settled already.
+    """The efforts for one pair of a job that has ``pair_count`` pairs, of which ``settled`` are settled already.
 
     ``counted`` says whether PostgreSQL has statistics of the table with all of the job's pairs open.
     """

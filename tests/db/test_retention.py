@@ -141,7 +141,7 @@ def test_what_is_old_expires_where_the_project_says_so(db: Database) -> None:
 
 @pytest.mark.parametrize("days", [projects.MOST_DAYS + 1, 1e6, 2.0**62])
 def test_a_project_that_keeps_things_for_ever_stops_nobody(db: Database, days: float) -> None:
-    """An earlier version took such numbers, and no date is so long ago."""
+    """An earlier version took such numbers, and no date is as early."""
     with db.write() as session:
         an_ended_job(session, with_region=False)
         projects.add(session, "others").keep_days = days

@@ -44,7 +44,7 @@ def save(db: Database, held: pairs.Claim, *results: PairResult) -> None:
 
 
 def next_round(db: Database, job_id: str, index: int, parts: tuple[int, ...] = (1,)) -> pairs.Claim:
-    """Claims all of a further iteration, in which the pairs have so many parts."""
+    """Claims all of a further iteration, in which the pairs have this many parts."""
     with db.write() as session:
         job = jobs.lock(session, job_id)
         new = [pairs.NewPair(i, f"a{i}", f"b{i}", 0.01, part) for i, count in enumerate(parts) for part in range(count)]

@@ -35,7 +35,7 @@ def test_small_pairs_fill_a_batch() -> None:
 
 
 def run(db: Database, pieces: int) -> list[str]:
-    """The jobs for which so many pieces of 1 s are claimed, in order."""
+    """The jobs for which this many pieces of 1 s are claimed, in order."""
     order = []
     for _ in range(pieces):
         with db.read() as session:

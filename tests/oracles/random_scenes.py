@@ -32,9 +32,9 @@ from tests.oracles.written_scenes import write_scene
 ROOT = Path(__file__).parents[2]
 SAMPLES, ON_FACES = 100_000, 0.2
 STARTS = 20
-"""From so many of the nearest samples the distance is followed downwards."""
+"""From this many of the nearest samples the distance is followed downwards."""
 STEPS = 40
-"""It is followed so many steps, or until bodies touch."""
+"""It is followed for this many steps, or until bodies touch."""
 ROOM = 0.03
 """At a seed all padded bodies are farther apart than this, in metres."""
 PRECISION = 1e-6
@@ -191,7 +191,7 @@ def _one(arguments: tuple[int, Path, float, int]) -> Result:
 
 
 def campaign(first: int, scenes: int, out: Path, deadline: float, samples: int, processes: int) -> list[Result]:
-    """Looks at so many scenes in so many processes, prints a line for each, and returns all results."""
+    """Looks at this many scenes in this many processes, prints a line for each, and returns all results."""
     known = {n: out / f"scene-{n:03d}" / "result.json" for n in range(first, first + scenes)}
     results = [Result(**json.loads(file.read_text())) for file in known.values() if file.exists()]
     for result in results:

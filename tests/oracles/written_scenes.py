@@ -41,7 +41,7 @@ class Link:
 
 
 def write_scene(directory: Path, rng: np.random.Generator, joints: int) -> Path:
-    """Writes a random scene of an arm of so many joints in a room of obstacles, and returns the path of its scene file."""
+    """Writes a random scene of an arm of this many joints in a room of obstacles, and returns the path of its scene file."""
     directory.mkdir(parents=True, exist_ok=True)
     arm, room = _arm(directory, rng, joints), _room(directory, rng)
     formats = [FORMATS[k] for k in rng.integers(len(FORMATS), size=2)]

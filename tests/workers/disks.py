@@ -61,7 +61,7 @@ class Image:
 
     @contextmanager
     def slow(self, bytes_a_second: int) -> Iterator[None]:
-        """Lets the disk write no more than so many bytes a second."""
+        """Lets the disk write no more than this many bytes a second."""
         device = os.stat(self._device()).st_rdev
         name = f"{os.major(device)}:{os.minor(device)}"
         THROTTLE.write_text(f"{name} {bytes_a_second}")

@@ -23,7 +23,7 @@ from workers.app import SOLVE, celery_app, send_work, waiting
 pytestmark = pytest.mark.lengthy
 
 LINGER_SECONDS = 3.0
-"""What must not happen is waited for so long."""
+"""Tests wait for this many seconds for what must not happen."""
 
 
 @pytest.fixture

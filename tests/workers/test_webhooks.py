@@ -105,7 +105,7 @@ def row_of(job_id: str) -> WebhookRow:
 
 
 def pass_time(seconds: float) -> None:
-    """What was to wait for so long waits no more."""
+    """What was to wait for this time waits no more."""
     with database().write() as session:
         for row in session.query(WebhookRow):
             row.next_at -= timedelta(seconds=seconds)

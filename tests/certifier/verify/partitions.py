@@ -81,7 +81,7 @@ class Producer:
         self.chosen = {i + len(alternatives[0]) * j: (a, b) for i, a in enumerate(alternatives[0]) for j, b in enumerate(alternatives[1])}
 
     def proof(self, depth: int = DEPTH, least: int = 0, halvings: int = 0) -> PartitionProof | None:
-        """The proof, with cells cut and pieces halved at least so many times; None where ``depth`` cuts are not enough."""
+        """The proof, with cells cut and pieces halved at least this many times; None where ``depth`` cuts are not enough."""
         self._halvings = halvings
         found = self._cell(self.lower, self.upper, depth, least)
         return found and found.proof(self.scene, self.volumes, self.frame, self.ground, self.interior, self.coarse, self.play)

@@ -185,7 +185,7 @@ def test_what_is_valid_is_accepted_and_true(kind):
 
 
 def campaign(strategy: st.SearchStrategy, check: Callable[[Any], None], examples: int, number: int) -> None:
-    """The check of so many examples; whatever fails is made as small as it can be."""
+    """The check of this many examples; whatever fails is made as small as it can be."""
     phases = (Phase.generate, Phase.shrink)
 
     @seed(number)

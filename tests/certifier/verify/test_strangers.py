@@ -318,7 +318,7 @@ def test_an_array_is_plain(content):
 
 
 def scene_of(joints: int, depth: int) -> dict[str, Any]:
-    """The region's scene with so many welds more, in chains of the depth."""
+    """The region's scene with this many welds more, in chains of the depth."""
     header, _ = unpack(valid("region"), "region")
     scene = header["scene"]
     weld = {**scene["joints"][0], "kind": "weld", "index": None, "lower": None, "upper": None, "axis": [0, 0, 0]}

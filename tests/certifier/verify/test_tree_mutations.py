@@ -176,7 +176,7 @@ def is_false(proof, tree, samples):
 
 
 def campaign(proofs, count):
-    """What became of so many changes: (name of the change, refused or accepted and true) -> how often."""
+    """What became of this many changes: (name of the change, refused or accepted and true) -> how often."""
     rng, counts, i = np.random.default_rng(0), Counter(), 0
     while counts.total() < count:
         (proof, samples), change = proofs[i % len(proofs)], CHANGES[i // len(proofs) % len(CHANGES)]

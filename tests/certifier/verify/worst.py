@@ -146,7 +146,7 @@ def gram_matrices() -> bytes:
 
 
 def _pair(scene: Scene, vertices: int, faces: int, ground: Ground, joints: tuple[int, ...]) -> bytes:
-    """A pair's file whose first volume has so many vertices, behind these joints; it fails at the residual."""
+    """A pair's file whose first volume has this many vertices, behind these joints; it fails at the residual."""
     n, rng, sides = scene.n, np.random.default_rng(0), []
     for chain_, count in ((joints, vertices), ((), 1)):
         length = 2 ** len(chain_)
