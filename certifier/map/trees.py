@@ -23,6 +23,7 @@ SHARE = 0.01
 Pairs = tuple[Pair, ...]
 """The pairs of one tree."""
 Geometries = list[Geometry]
+Names = tuple[str, ...]
 
 
 class Plan:
@@ -33,7 +34,7 @@ class Plan:
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._known = scene, {frozenset((pair.a, pair.b)): pair for pair in scene.pairs}
-        self._volumes: dict[Pairs, tuple[Volume, Volume] | None] = {}
+        self._volumes: dict[tuple[Names, Names], tuple[Volume, Volume] | None] = {}
         self._chosen: set[Pairs] | None = None
         self._parts = list(itertools.combinations(_rigid_parts(scene), 2))
 
@@ -93,11 +94,12 @@ class Plan:
 
     def _gaps(self, first: Geometries, second: Geometries, samples: Array) -> Array | None:
         """Returns how far the volumes around geometries are apart, in metres; None where not all between them are pairs of one padding."""
-        pairs = self._between(first, second)
-        if pairs not in self._volumes:
+        key = tuple(geometry.name for geometry in first), tuple(geometry.name for geometry in second)
+        if key not in self._volumes:
+            pairs = self._between(first, second)
             same = len(pairs) == len(first) * len(second) and len({self._scene.padding_of(pair) for pair in pairs}) == 1
-            self._volumes[pairs] = volumes_of(self._scene, pairs) if same else None
-        volumes = self._volumes[pairs]
+            self._volumes[key] = volumes_of(self._scene, pairs) if same else None
+        volumes = self._volumes[key]
         return None if volumes is None else gaps_between(self._scene, *volumes, samples)
 
 
