@@ -17,6 +17,7 @@ from api.access_log import AccessLog
 from api.announce import Announcer
 from api.cells import OutlinesKept
 from api.children import AT_ONCE, ChildLimiter
+from api.free_sets import FreeSetsKept
 from api.libraries import Libraries
 from api.links import LinksKept
 from api.metrics import Requests
@@ -80,6 +81,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.libraries = Libraries()
     app.state.links = LinksKept()
     app.state.motions = MotionsKept()
+    app.state.free_sets = FreeSetsKept()
     app.state.outlines = OutlinesKept()
     app.state.room = Room()
     app.state.keyring = Keyring(app.state.database, open_without_keys=settings().loopback)

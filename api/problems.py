@@ -32,6 +32,7 @@ _STATUS_OF_CODE = {
             "proof_not_found",
             "webhook_not_found",
             "cover_not_found",
+            "map_not_found",
             "motion_not_found",
             "pair_not_found",
             "cells_not_found",

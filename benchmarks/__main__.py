@@ -103,7 +103,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "cover": _cover,
     "robots": lambda args, screen: robots.robots(args.robots, args.deadline, screen.line),
     "arms": lambda args, screen: makers.arms(args.arms, args.deadline, args.motions, screen.line),
-    "map": lambda args, screen: maps.maps(args.scenes, args.limit, screen.line),
+    "map": lambda args, screen: maps.maps(args.scenes, args.limit, screen.line, args.drake),
     "recertify": lambda args, screen: recertify.changes(args.scenes, args.limit, screen.line),
     "query": lambda args, screen: query.query(args.regions, screen.line),
     "plan": lambda args, screen: plan.motions(args.scene, args.url, args.queries, args.points, screen.line),
@@ -146,7 +146,7 @@ def _parser() -> ArgumentParser:
     covered = kinds.add_parser("cover", parents=[as_json], help="measure how much regions cover over the seconds")
     covered.add_argument("case", choices=list(cover.CASES))
     covered.add_argument(
-        "--way", action="append", choices=[cover.CIRIS, cover.DRAKE], help="drake: IRIS regions without certificates; default ciris"
+        "--way", action="append", choices=[*cover.WAYS], help="drake and iris_zo: IRIS regions without certificates; default ciris"
     )
     covered.add_argument("--deadline", type=_seconds, metavar="SECONDS", help="default: the case's")
     covered.add_argument("--processes", type=_count, default=2, metavar="N", help="number of solving processes; default 2")
@@ -203,6 +203,9 @@ def _parser() -> ArgumentParser:
     mapped.add_argument("scenes", nargs="*", metavar="EXAMPLE", default=list(maps.SCENES), help=f"default: {', '.join(maps.SCENES)}")
     mapped.add_argument(
         "--limit", type=float, default=maps.LIMIT, metavar="SECONDS", help=f"each map ends at this many seconds; default {maps.LIMIT:g}"
+    )
+    mapped.add_argument(
+        "--drake", type=_count, default=0, metavar="N", help="Drake looks for collisions at N configurations of each free set; default 0"
     )
 
     changed = kinds.add_parser("recertify", parents=[as_json], help="certify regions again whose scenes have changed, and grow them anew")

@@ -1,7 +1,8 @@
-"""This module measures how fast regions cover a scene: the service's certified ones, and Drake's IRIS regions without certificates.
+"""This module measures how fast a scene is covered: by the service's certified regions, by a map, and by IRIS regions without certificates.
 
 Each case is a cover of an example, with its goals and its deadline. The service runs separately, with a data directory that may be kept.
-IRIS goes by the same rules for its seeds, in as many processes and for as long; its regions count as they are proposed.
+IRIS goes by the same rules for its seeds, in as many processes and for as long; its regions count as they are proposed. Drake's own is
+IrisZo. A map grows until the coverage is reached, in as many processes and for as long.
 """
 
 from __future__ import annotations
@@ -11,15 +12,27 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from benchmarks import catalogue, iris_cover, measure
 from benchmarks.measure import Progress
 from benchmarks.service import running
+from benchmarks.svg import Panel, draw
+from certifier.jobs.map import grow_map
+from certifier.model import Scene
+from certifier.seeding.options import Method
 from ciris.synchronous.client import Client
 
-CIRIS, DRAKE = "ciris", "drake"
+CIRIS, DRAKE, ZO, MAP = "ciris", "drake", "iris_zo", "map"
+WAYS = {
+    CIRIS: "certified regions",
+    MAP: "a map",
+    DRAKE: "IRIS regions, no certificates",
+    ZO: "Drake's IrisZo, no certificates",
+}
+"""How the picture calls the ways."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +57,7 @@ CASES = {
     "arm_3dof": Case("arm_3dof", 300, {"coverage": 0.85, "connected": True}),
     "ur3e_bin": Case("ur3e_bin", 600, {"coverage": 0.99, "connected": True}),
     "iiwa_shelf": Case("iiwa_shelf", 600, {"connect": list(SHELF.values())}),
+    "iiwa_shelf_free": Case("iiwa_shelf", 300, {"coverage": 0.95, "stages": 1}),
 }
 
 
@@ -65,9 +79,13 @@ def cover(
     runs = {}
     if CIRIS in ways:
         runs[CIRIS] = _certified(case, options, processes, seconds, data, verify, progress)
-    if DRAKE in ways:
-        scene = catalogue.scene(case.example)
-        runs[DRAKE] = iris_cover.cover(scene, options, processes, seconds, lambda point: progress(_line(DRAKE, point)))
+    scene = catalogue.scene(case.example)
+    if MAP in ways:
+        runs[MAP] = _mapped(scene, options, processes, seconds, progress)
+    for way, method in ((DRAKE, Method.IRIS), (ZO, Method.IRIS_ZO)):
+        if way in ways:
+            told = partial(_tell, progress, way)
+            runs[way] = iris_cover.cover(scene, options, processes, seconds, told, method)
     return {
         "benchmark": "cover",
         "machine": measure.machine(),
@@ -78,6 +96,29 @@ def cover(
         "processes": processes,
         "runs": runs,
     }
+
+
+def _tell(progress: Progress, way: str, point: dict[str, Any]) -> None:
+    progress(_line(way, point))
+
+
+def _mapped(scene: Scene, options: dict[str, Any], processes: int, seconds: float, progress: Progress) -> dict[str, Any]:
+    """Grows the scene's map."""
+    points: list[dict[str, Any]] = []
+
+    def tell(_: str, now: dict[str, Any]) -> None:
+        points.append({"seconds": now["seconds"], "coverage": now["coverage"], "stderr": now["error"], "cells": now["cells"]})
+        progress(f"{MAP} {now['seconds']:.1f} s: {100 * now['coverage']:.1f} +- {100 * now['error']:.1f} % proved, {now['cells']} cells")
+
+    found = grow_map(scene, options.get("coverage", 1.0), seconds, processes, tell)
+    tell(MAP, {"seconds": found.seconds, "coverage": found.coverage.share, "error": found.coverage.error, "cells": found.cells})
+    return {"points": points, "reason": found.reason, "seconds": found.seconds, "cells": found.cells}
+
+
+def picture(document: dict[str, Any]) -> str:
+    """Draws the coverage of all ways over the seconds as SVG."""
+    series = {WAYS[way]: [(point["seconds"], point["coverage"]) for point in run["points"]] for way, run in document["runs"].items()}
+    return draw([Panel(document["scene"], series)], "share of the free configurations, over seconds", share=True)
 
 
 @contextmanager
@@ -137,6 +178,8 @@ def table(way: str, run: dict[str, Any]) -> list[tuple[str, ...]]:
             f"{100 * point['largest']:.1f}",
             " ".join("-" if part is None else str(part) for part in point["connect"]),
         )
+        if "regions" in point
+        else (way, f"{point['seconds']:.1f}", f"{100 * point['coverage']:.1f} ± {100 * point['stderr']:.1f}", "", "", "", "")
         for point in run["points"]
     ]
 

@@ -20,7 +20,7 @@ from certifier.model import Scene, StoredRegion
 from certifier.pair.collisions import in_collision
 from certifier.polytopes.gibbs import uniform_in_q
 from certifier.polytopes.polytope import bounds
-from certifier.seeding.options import SeedOptions
+from certifier.seeding.options import Method, SeedOptions
 from certifier.seeding.proposal import Proposal
 from certifier.seeding.propose import propose
 from planner.cover.known import Known
@@ -60,12 +60,20 @@ class _Regions:
         self.colliding.append(float(in_collision(self._scene, samples).mean()))
 
 
-def cover(scene: Scene, options: dict[str, Any], processes: int, seconds: float, tell: Callable[[dict[str, Any]], None]) -> dict[str, Any]:
+def cover(
+    scene: Scene,
+    options: dict[str, Any],
+    processes: int,
+    seconds: float,
+    tell: Callable[[dict[str, Any]], None],
+    method: Method = Method.IRIS,
+) -> dict[str, Any]:
     """Covers a scene with what IRIS proposes, until the goals are reached or the time is over. Returns the run's document.
 
     Args:
         options: as of a cover; those about certifying have no effect.
         tell: hears of every look at the scene.
+        method: which IRIS proposes.
     """
     parsed, start = CoverOptions.from_document(options), time.monotonic()
     look, regions = Look(scene, partial(in_collision, scene), parsed), _Regions(scene)
@@ -87,7 +95,9 @@ def cover(scene: Scene, options: dict[str, Any], processes: int, seconds: float,
             elif action.stop:
                 report = Ended(dict.fromkeys(transition.state.growing, "given up"))
             else:
-                growing |= {pool.submit(_iris, scene.to_document(), _seed(task, parsed)): number for number, task in action.begin.items()}
+                growing |= {
+                    pool.submit(_iris, scene.to_document(), _seed(task, parsed, method)): number for number, task in action.begin.items()
+                }
                 transition = type(transition)(transition.state, Watch())  # these are begun
                 done, _ = wait(growing, max(left, 0.0), FIRST_COMPLETED)
                 ended = {growing.pop(future): _came(future, regions) for future in done}
@@ -119,8 +129,8 @@ def point(seconds: float, known: dict[str, Any]) -> dict[str, Any]:
     return {"seconds": seconds, **coverage, **{name: known[name] for name in names}}
 
 
-def _seed(task: Task, options: CoverOptions) -> dict[str, Any]:
-    return SeedOptions(q=task.q, contain=task.contain, random_seed=options.random_seed).to_document()
+def _seed(task: Task, options: CoverOptions, method: Method) -> dict[str, Any]:
+    return SeedOptions(method=method, q=task.q, contain=task.contain, random_seed=options.random_seed).to_document()
 
 
 def _iris(scene: dict[str, Any], seed: dict[str, Any]) -> dict[str, Any]:

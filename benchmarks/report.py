@@ -26,6 +26,7 @@ Document = dict[str, Any]
 PICTURES: dict[str, tuple[Path, Callable[[Document], str]]] = {
     "scaling": (FIGURES / "scaling.svg", scaling.picture),
     "growth": (ROOT / "docs/pictures/growth.svg", growth.picture),
+    "cover": (ROOT / "docs/pictures/coverage.svg", cover.picture),
 }
 """Maps a document to the file of its picture and what draws it."""
 
@@ -348,7 +349,10 @@ def _cover(document: Document) -> list[str]:
         shown = cover.table(way, run)
         rows += [*shown[:: max(len(shown) // COVER_ROWS, 1)][:-1], *shown[-1:]]
         extra = "" if "proofs_hold" not in run else f" The verifier has accepted the proofs of {run['proofs_hold']} regions once more."
-        said.append(f"{way}: {run['reason']}. {run['without_region']} of {run['begun']} seeds gave no region.{extra}")
+        seeds = (
+            f"{run['without_region']} of {run['begun']} seeds gave no region." if "begun" in run else f"{run['cells']} cells are proved."
+        )
+        said.append(f"{way}: {run['reason']}. {seeds}{extra}")
         if run.get("colliding"):
             mean, largest = (100 * run["colliding"][which] for which in ("mean", "largest"))
             said.append(f"In its regions {mean:.2g} % of the samples collide, in one of them {largest:.2g} %.")
@@ -411,14 +415,21 @@ def _recertify(document: Document) -> list[str]:
 def _map(document: Document) -> list[str]:
     """Returns a table with one line for each scene."""
     sizes_and_costs = ["cells", "proof", "verify", "free set", "point", "1000 points", "motion"]
-    header = ["example", "pairs", "covered", *sizes_and_costs, "straight", "connected"]
+    header = ["example", "pairs", "covered", *sizes_and_costs, "straight", "connected", "obstacle more", "Drake"]
     rows = []
     for row in document["rows"]:
         over_time = ", ".join(f"{share:.2f} after {seconds(at)}" for at, share in row["over_time"])
         sizes = [f"{row['proof_bytes'] / 1e6:.2f} MB", seconds(row["verify_seconds"]), f"{row['free_set_bytes'] / 1e3:.0f} kB"]
         costs = [f"{1e6 * row[what]['p99']:.0f} us" for what in ("point_seconds", "batch_seconds", "motion_seconds")]
         shares = [f"{row[what]:.2f}" for what in ("straight", "connected")]
-        rows.append([row["example"], str(row["pairs"]), over_time, str(row["cells"]), *sizes, *costs, *shares])
+        again = row["obstacle_more"]
+        changed = ", ".join(
+            f"{again[run]['coverage']:.2f} after {seconds(again[run]['seconds'])} {words}"
+            for run, words in (("taken_over", "s"), ("anew", "s anew"))
+        )
+        asked = row["drake"]
+        checked = f"{asked['collisions']} of {asked['configurations']}" if asked["configurations"] else ""
+        rows.append([row["example"], str(row["pairs"]), over_time, str(row["cells"]), *sizes, *costs, *shares, changed, checked])
     return [_table(header, rows)]
 
 

@@ -92,7 +92,7 @@ class Hit:
 
 @dataclass(frozen=True)
 class Contained:
-    """Which regions contain one point. It is true if some region does."""
+    """What proves one point free: regions, tubes of motions, or the scene's latest map. It is true if something does."""
 
     inside: bool
     regions: tuple[Hit, ...]
@@ -101,17 +101,19 @@ class Contained:
     """The largest margin, in s; None where no region contains the point."""
     motions: tuple[str, ...]
     """Ids of the proved motions whose tubes contain the point."""
+    map: bool | None
+    """Whether the scene's latest map proves the point free; None where the scene has no map."""
 
     def __bool__(self) -> bool:
         return self.inside
 
 
 class Containment(Answers[Contained]):
-    """Which regions and tubes contain each of k points. It is true only if every point is in one."""
+    """What proves each of k points free. It is true only if something proves every point."""
 
     @property
     def inside(self) -> NDArray[np.bool_]:
-        """(k,) whether some region, or the tube of some motion, contains the point."""
+        """(k,) whether some region, the tube of some motion, or the scene's latest map proves the point free."""
         return np.array([point.inside for point in self])
 
     @property
@@ -146,15 +148,17 @@ class Nearest(Answers[Near | None]):
 
 @dataclass(frozen=True)
 class Piece:
-    """What proves a motion between two times: a region that contains it, or the tube of a proved motion."""
+    """What proves a motion between two times: a region that contains it, the tube of a proved motion, or a map."""
 
     begin: float
     end: float
     region: str | None
-    """Id of the region; None where a motion's tube contains it."""
+    """Id of the region; None where a motion's tube or a map proves it."""
     guarantee: Guarantee
     motion: str | None = None
-    """Id of the proved motion; None for a region."""
+    """Id of the proved motion; None for a region or a map."""
+    map: str | None = None
+    """Id of the job that has grown the map; None for a region or a motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -494,6 +498,66 @@ class FreeCoverage:
 
     def __float__(self) -> float:
         return self.value
+
+
+@dataclass(frozen=True)
+class MapCoverage:
+    """How much of the collision-free configurations a map proves. It is estimated from samples, and proves nothing."""
+
+    value: float
+    stderr: float
+
+    def __float__(self) -> float:
+        return self.value
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Whether a map proves a configuration that it was to cover first."""
+
+    q: tuple[float, ...]
+    state: str
+    """``proved`` (free of collision), ``open`` (the map has no proof there), or ``in_collision``."""
+
+
+@dataclass(frozen=True)
+class StoredMap:
+    """A map whose proof has passed the verifier."""
+
+    cells: int
+    """How many cells are proved."""
+    uncovered_pairs: int
+    """How many pairs have no cell. As long as there are some, no configuration is proved free."""
+    at: tuple[Wanted, ...]
+    proof: str
+    """SHA-256 of the proof file."""
+    free_set: bool
+    """Whether there is a free set for lookups."""
+
+
+@dataclass(frozen=True)
+class Map:
+    """What a job has proved of all of the joint space. It is true if it covers as much as was asked for."""
+
+    outcome: Outcome | None
+    ended: str | None
+    """``coverage``, ``deadline``, ``nothing_left``, ``size`` (the verifier would not read a larger map) or ``cancelled``."""
+    reason: str | None
+    """A sentence that says why it ended."""
+    seconds: float | None
+    coverage: MapCoverage | None
+    cells: int
+    curve: tuple[tuple[float, float], ...]
+    """Seconds since the start, and the coverage by then."""
+    stored: StoredMap | None
+    """What is verified and stored; None before the job has ended, and where nothing is proved."""
+
+    def __bool__(self) -> bool:
+        return self.outcome is Outcome.CERTIFIED
+
+    def __repr__(self) -> str:
+        proved = "nothing known" if self.coverage is None else f"{100 * self.coverage.value:.3g} % proved"
+        return f"Map({proved}, {self.cells} cells, {self.reason})"
 
 
 @dataclass(frozen=True)

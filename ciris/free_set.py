@@ -82,6 +82,15 @@ class FreeSet(InSpace):
                 data = file.read(LARGEST + 1)
         except OSError as error:
             raise CirisError("no_file", unreadable(error), field=str(path), hint="name the file that ciris free-set wrote") from None
+        return cls.of_bytes(data, str(path))
+
+    @classmethod
+    def of_bytes(cls, data: bytes, name: str) -> Self:
+        """Does as :meth:`load` with the bytes of a file.
+
+        Args:
+            name: what errors call the file.
+        """
         try:
             from ciris import lookups
         except ModuleNotFoundError as error:
@@ -92,10 +101,10 @@ class FreeSet(InSpace):
         try:
             head, arrays = _read(data)
             if head["format"] != FORMAT:
-                raise CirisError("free_set", f"it has the format {head['format']!r}, not {FORMAT}", field=str(path), hint=AGAIN)
+                raise CirisError("free_set", f"it has the format {head['format']!r}, not {FORMAT}", field=name, hint=AGAIN)
             found = _checked(cls, head, arrays, lookups)
         except DAMAGES:
-            raise CirisError("free_set", "it is no free set, or is damaged", field=str(path), hint=AGAIN) from None
+            raise CirisError("free_set", "it is no free set, or is damaged", field=name, hint=AGAIN) from None
         middle = (found.space.q_lower + found.space.q_upper) / 2
         found.contains(middle)
         found.contains_motion(middle, middle)

@@ -16,7 +16,7 @@ class JobData:
 
     id: str
     kind: str
-    """``grow``, ``recertify``, ``certify``, ``certify-path`` or ``cover``."""
+    """``grow``, ``recertify``, ``certify``, ``certify-path``, ``cover`` or ``map``."""
     scene: str
     """Id of the scene."""
     state: str

@@ -17,7 +17,7 @@ class JobOptions(TypedDict, total=False):
     """Options of all jobs."""
 
     deadline: float
-    """The job ends this many seconds after its creation, with its regions so far. Default: no deadline."""
+    """The job ends this many seconds after its creation, with what is proved so far. Default: no deadline."""
     priority: int
     """From -3 to 3. Each step up doubles the job's share of the work for its API key. Default: 0."""
     labels: Mapping[str, str]
@@ -171,6 +171,25 @@ COVER: Fields = {
     "region_seconds": ("options.region_seconds", "real"),
     "cells": ("options.cells", "whole"),
     "stages": ("options.stages", "whole"),
+    "random_seed": ("options.random_seed", "whole"),
+}
+
+
+class MapOptions(JobOptions, total=False):
+    """Options of jobs of the kind ``map``."""
+
+    coverage: float
+    """The map ends when it covers this share of the free configurations. Default: 0.9."""
+    at: ArrayLike
+    """(n,) or (k, n). Joint positions that the map is to cover first."""
+    random_seed: int
+    """Seed of every random choice. Default: 0."""
+
+
+MAP: Fields = {
+    **JOB,
+    "coverage": ("options.coverage", "real"),
+    "at": ("options.at", "points"),
     "random_seed": ("options.random_seed", "whole"),
 }
 

@@ -2,7 +2,7 @@
 
 from certifier.errors import CirisError
 from certifier.outcome import Guarantee, Outcome
-from ciris.answers import Containment, Cover, Coverage, Event, Graph, Motion, Nearest, Obstacle, Plan, Segments, Verification
+from ciris.answers import Containment, Cover, Coverage, Event, Graph, Map, Motion, Nearest, Obstacle, Plan, Segments, Verification
 from ciris.asynchronous.service import AsyncJob, AsyncRegion, AsyncService
 from ciris.connecting import connect, connect_async
 from ciris.free_set import FreeSet, OpenPart
@@ -23,6 +23,7 @@ __all__ = [
     "Graph",
     "Guarantee",
     "Job",
+    "Map",
     "Motion",
     "Nearest",
     "Obstacle",

@@ -297,10 +297,13 @@ def contains(args: Namespace) -> int:
     for q, point in zip(points, answer["points"], strict=True):
         where = shown(q)
         if point["inside"]:
-            hits = "; ".join(f"{hit['region']} (margin {hit['margin']:.3g}, {hit['guarantee']})" for hit in point["regions"])
-            print(f"inside: {where} in {hits}")
+            proofs = [f"{hit['region']} (margin {hit['margin']:.3g}, {hit['guarantee']})" for hit in point["regions"]]
+            proofs += [f"motion {motion}" for motion in point["motions"]]
+            proofs += [f"map of job {answer['map']}"] * bool(point["map"])
+            print(f"inside: {where} in {'; '.join(proofs)}")
         else:
-            print(f"outside: {where} is in none of {answer['regions']} regions")
+            mapped = "" if point["map"] is None else ", nor does the map prove it free"
+            print(f"outside: {where} is in none of {answer['regions']} regions{mapped}")
     return OK if inside else NO
 
 

@@ -9,7 +9,13 @@ from ciris.documents import Document
 from ciris.synchronous.client import Client
 from client.output import Screen, number, plain, q_volume, seconds, share
 
-_STEPS = {"propose": "seeding", "step": "polytope step", "accept": "assembling and verifying the region", "motion": "certifying the motion"}
+_STEPS = {
+    "propose": "seeding",
+    "step": "polytope step",
+    "accept": "assembling and verifying the proof",
+    "motion": "certifying the motion",
+    "map": "growing the map",
+}
 _LOOK = "scout"
 """The step of a cover whose findings are printed instead of it."""
 

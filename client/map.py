@@ -1,8 +1,10 @@
-"""``ciris map`` grows the map of a scene: what is proved of all of the joint space."""
+"""``ciris map`` grows the map of a scene, here or by the service: what is proved of all of the joint space."""
 
 from __future__ import annotations
 
+import hashlib
 from argparse import Namespace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,8 +13,12 @@ from certifier.errors import CirisError, RegionError
 from certifier.map.options import MapOptions
 from certifier.model import Scene
 from certifier.options import read
+from certifier.proof.map import MapProof
 from certifier.seeding.limits import check_limits
-from client import output
+from certifier.verify.file import read_file
+from ciris.documents import Document
+from ciris.synchronous.client import Client
+from client import output, service
 from client.cores import cores
 from client.files import ProofFile, check_writable
 from client.inputs import Given
@@ -20,42 +26,61 @@ from client.local import load, positions_of
 from client.options import MAP
 from client.output import Screen, print_json
 from client.request import refuse_of_service, request
+from client.verify import in_child
 
 OK, NO, INTERRUPTED = 0, 1, 130
 ENDS = {
-    "size": "it ended because the verifier would not read a larger file",
-    "worker_lost": "it ended because a process died; look whether the machine ran out of memory: fewer cores need less of it",
+    "coverage": "it covers as much as was asked for",
+    "deadline": "the deadline",
+    "nothing_left": "nothing is left that a map could prove",
+    "interrupted": "it was interrupted",
+    "cancelled": "somebody cancelled it",
+    "size": "the verifier would not read a larger file",
+    "worker_lost": "a process died; look whether the machine ran out of memory: fewer cores need less of it",
 }
-"""What to say of these ends; the others say themselves."""
-NOT_YET = "add --local: the service has no jobs of this kind yet"
+"""Why a map ended, in words."""
 
 
 def grow(args: Namespace) -> int:
-    """Grows a map in this process and children of it, and returns the command's exit status.
+    """Grows a map, here or by the service, and returns the command's exit status.
 
     Raises:
-        CirisError: something that was given is wrong.
+        CirisError: something that was given is wrong, or what went wrong.
     """
-    if not args.local:
-        raise CirisError("option", "maps are grown on this machine only", field="--local", hint=NOT_YET)
-    refuse_of_service(args)
-    screen, asked = Screen(), request(args, MAP)
+    asked = request(args, MAP)
     check_writable(args.out)
+    document = (_here if args.local else _by_service)(args, asked)
+    if args.json:
+        print_json(document)
+    else:
+        _print(document)
+    if document["ended"] == "interrupted":
+        return INTERRUPTED
+    return OK if document["outcome"] == "certified" and all(one["state"] == "proved" for one in document["at"]) else NO
+
+
+def _here(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
+    """Grows a map in this process and children of it, and returns what to tell of it."""
+    refuse_of_service(args)
+    screen = Screen()
     scene = load(args.scene)
     wanted = [_wanted(scene, q, f"options.at[{i}]") for i, q in enumerate(asked["options"].pop("at", []))]
     options = read(MapOptions, asked["options"], "options")
     at = scene.to_s(scene.in_windows(np.array(wanted).reshape(-1, scene.n)))
     from certifier.jobs.map import grow_map
 
+    former = None if args.former is None else _former(args.former)
+
     def tell(_: str, told: dict[str, Any]) -> None:
         screen.status(_said(told["coverage"], told["error"], told["cells"]), told["coverage"])
 
-    found = grow_map(scene, options.coverage, asked.get("deadline_seconds"), cores(), tell, at, options.random_seed)
+    found = grow_map(scene, options.coverage, asked.get("deadline_seconds"), cores(), tell, at, options.random_seed, former)
     screen.clear()
     path = ProofFile(args.out).write(scene.name, found.proof.to_bytes())
     share, error = found.coverage
-    document = {
+    return {
         "scene": {"name": scene.name, "hash": scene.hash},
+        "outcome": "certified" if share >= options.coverage else "inconclusive",
         "coverage": {"value": share, "stderr": error},
         "cells": found.cells,
         "looked_at": found.looked,
@@ -65,20 +90,83 @@ def grow(args: Namespace) -> int:
         "at": [{"q": list(q), "state": state} for q, state in zip(wanted, found.wanted, strict=True)],
         "proof": str(path),
     }
+
+
+def _by_service(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
+    """Has the service grow a map, and returns what to tell of it."""
+    with service.connect(args.url) as client:
+        scene = service.known_scene(client, args.scene)
+        former = {} if args.former is None else {"former": args.former}
+        job = service.run(client, {"kind": "map", "scene": scene["id"], **asked, **former}, Screen())
+        return _written(client, job["id"], scene, args.out)
+
+
+def of_job(args: Namespace) -> int:
+    """Writes the map that a job of the service has grown, and returns the command's exit status.
+
+    Raises:
+        CirisError: there is no such job, it grows no map, or a file cannot be written.
+    """
+    for path in (args.out, args.free_set):
+        check_writable(path)
+    with service.connect(args.url) as client:
+        job = client.job(args.job)
+        document = _written(client, job["id"], client.scene(job["scene"]), args.out)
+        if args.free_set is not None:
+            Path(args.free_set).write_bytes(client.free_set(job["id"]))
     if args.json:
         print_json(document)
     else:
-        print(f"{scene.name}: {_said(share, error, found.cells)}, {output.seconds(found.seconds)}")
-        for q, state in zip(wanted, found.wanted, strict=True):
-            print(f"q = {', '.join(f'{value:.6g}' for value in q)}: {output.plain(state)}")
-        if found.refused:
-            print(f"{found.refused} pieces of work were given up: the verifier refused what they found")
-        if found.reason in ENDS:
-            print(ENDS[found.reason])
-        print(f"proof {path} (check it: ciris verify {path})")
-    if found.reason == "interrupted":
-        return INTERRUPTED
-    return OK if share >= options.coverage and set(found.wanted) <= {"proved"} else NO
+        _print(document)
+    return OK if document["proof"] is not None else NO
+
+
+def _written(client: Client, job: str, scene: Document, out: str | None) -> dict[str, Any]:
+    """Writes the proof of the map of a job, if it is stored, and returns what to tell of the map."""
+    found = client.map(job)
+    stored = found["stored"]
+    path = None if stored is None else ProofFile(out).write(scene["name"], client.map_proof(job))
+    return {
+        "scene": {"name": scene["name"], "hash": scene["hash"]},
+        "job": job,
+        "outcome": found["outcome"],
+        "coverage": found["coverage"],
+        "cells": found["cells"],
+        "looked_at": found["looked_at"],
+        "seconds": found["seconds"],
+        "ended": found["ended"],
+        "given_up": found["given_up"],
+        "at": [] if stored is None else stored["at"],
+        "proof": None if path is None else str(path),
+    }
+
+
+def _print(document: dict[str, Any]) -> None:
+    coverage, proof = document["coverage"], document["proof"]
+    said = "nothing proved" if coverage is None else _said(coverage["value"], coverage["stderr"], document["cells"])
+    print(f"{document['scene']['name']}: {said}, {output.seconds(document['seconds'])}")
+    for one in document["at"]:
+        print(f"q = {', '.join(f'{value:.6g}' for value in one['q'])}: {output.plain(one['state'])}")
+    if document["given_up"]:
+        print(f"{document['given_up']} pieces of work were given up: the verifier refused what they found")
+    if document["ended"] in ENDS:
+        print(f"ended: {ENDS[document['ended']]}")
+    elif document["ended"] is None:
+        print("it has not ended, or has failed: ciris job show says why")
+    if proof is not None:
+        print(f"proof {proof} (check it: ciris verify {proof})")
+
+
+def _former(path: str) -> MapProof:
+    """Returns the map of a proof file, which a child process has verified.
+
+    Raises:
+        CirisError: the file cannot be read, is no map, or does not hold.
+    """
+    checked, data = in_child("certifier.map.free_set:checked", path), read_file(path)
+    if hashlib.sha256(data).hexdigest() != checked["sha256"]:
+        raise CirisError("proof_malformed", "it has changed since it was checked", field=path, hint="name a file that nobody writes to")
+    return MapProof.from_bytes(data)
 
 
 def _wanted(scene: Scene, given: Given, field: str) -> list[float]:

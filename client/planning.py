@@ -146,8 +146,7 @@ def path(args: Namespace) -> int:
         return OK if answer["covered"] else NO
     _print_pieces(answer["pieces"])
     if stop is None:
-        count = len({piece["region"] for piece in answer["pieces"]})
-        print(f"covered: every point of the path is in certified regions, {count} of {answer['regions']}")
+        print("covered: every point of the path is proved to be free of collision")
     else:
         print(f"not covered from {stop['time']:.6g} on, at q = {_place(stop['q'])}")
         print(f"next: {_near(stop['next']) if stop['next'] else _no_region(answer)}")
@@ -260,6 +259,8 @@ def _print_pieces(pieces: Sequence[dict[str, Any]]) -> None:
 
 def _proof_of(piece: dict[str, Any]) -> str:
     """Returns what proves a piece of a motion."""
+    if piece.get("map"):
+        return f"map of job {piece['map']}"
     return f"motion {piece['motion']}" if piece["motion"] else f"region {piece['region']}"
 
 

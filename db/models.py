@@ -146,7 +146,7 @@ class AuditRow(Owned, Base):
 
 
 class JobRow(Owned, Base):
-    """A job is one request to grow a region, to certify a polytope or a motion, or to cover a scene; or a region of a cover."""
+    """A job is one request to grow a region or a map, to certify a polytope or a motion, or to cover a scene; or a region of a cover."""
 
     __tablename__ = "jobs"
     __table_args__ = (
@@ -170,8 +170,8 @@ class JobRow(Owned, Base):
     """What CirisError.to_document() returned, when the job failed."""
     options: Mapped[Document]
     """What certifier.growth.options.GrowthOptions.to_document() returned; for a cover, planner.cover.options.CoverOptions.to_document();
-    for a motion, what certifier.motion.given.motion_of() takes, with ``space`` where it was given, ``tube``,
-    ``padding`` and ``clearance``."""
+    for a map, the fields of certifier.map.options.MapOptions; for a motion, what certifier.motion.given.motion_of() takes, with ``space``
+    where it was given, ``tube``, ``padding`` and ``clearance``."""
     action: Mapped[Document | None] = mapped_column(deferred=True)
     """The action that the job waits for: its kind, the iteration of a certification, the outcome and reason of an end.
 
@@ -251,7 +251,8 @@ class GrowthRow(Base):
 
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
     document: Mapped[Document]
-    """The document of the job's state after the last decision: certifier.growth.state.GrowthState, or planner.cover.state.CoverState."""
+    """The document of the job's state after the last decision: certifier.growth.state.GrowthState, or planner.cover.state.CoverState; of a
+    map, jobs.mapping.Account after the last round."""
 
 
 class IterationRow(Base):
@@ -338,11 +339,12 @@ class SubtreesRow(Base):
 
 
 class StepRow(Leased, Base):
-    """A step is a piece of a job that is no pair: seeding, the polytope step, accepting a region, a look at what is covered, a motion."""
+    """A step is a piece of a job that is no pair: seeding, the polytope step, accepting a region, a look at what is covered, a motion, a
+    map and the pieces of its rounds."""
 
     __tablename__ = "steps"
     __table_args__ = (
-        UniqueConstraint("job_id", "turn", "kind"),
+        UniqueConstraint("job_id", "turn", "kind", "number"),
         Index(None, "state", "lease_until"),
         Index(None, "job_id", "state"),
         _proofs_of("steps"),
@@ -355,14 +357,30 @@ class StepRow(Leased, Base):
     """The job's turn that asked for the step."""
     kind: Mapped[str] = mapped_column(String(16))
     """``accept``, or what the kind of the job calls it."""
+    number: Mapped[int] = mapped_column(default=0)
+    """The number of a piece of a map's round, from 0."""
     state: Mapped[str] = mapped_column(String(16), default=states.StepState.OPEN)
     input: Mapped[Document]
     """What the step works on: the action, or the accepted polytope."""
     report: Mapped[Document | None]
     """What the step found, or the CirisError document that says why it failed."""
     proof_digest: Mapped[str | None] = mapped_column(ForeignKey("proofs.digest"))
-    """The proof of the motion that the step has certified."""
+    """The proof of the motion that the step has certified, or of the map that it has accepted."""
+    data: Mapped[bytes | None] = mapped_column(deferred=True)
+    """Of a piece of a map's round, its tasks, and then what was found; of a map that was accepted, its free set as a file."""
     seconds: Mapped[float | None]
+
+
+class MapPieceRow(Base):
+    """What was found for a piece of a round of a map. All of them together are the map, until its proof is stored."""
+
+    __tablename__ = "map_pieces"
+
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
+    round: Mapped[int] = mapped_column(primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True)
+    data: Mapped[bytes]
+    """What certifier.map.packed.pack_entries() returned."""
 
 
 class ProofRow(Base):

@@ -18,6 +18,7 @@ from db import jobs, motions, projects, proofs, regions, scenes
 from db.models import (
     EventRow,
     JobRow,
+    MapPieceRow,
     MotionRow,
     PairRow,
     ProjectRow,
@@ -29,7 +30,7 @@ from db.models import (
     SubtreesRow,
     WebhookRow,
 )
-from db.states import JOB, WebhookState, unfinished
+from db.states import ACCEPT, JOB, StepState, WebhookState, unfinished
 
 TOGETHER = 20
 """Number of jobs that expire in one transaction."""
@@ -37,7 +38,7 @@ TOGETHER = 20
 
 @dataclass(frozen=True)
 class Dependents:
-    """Counts what goes with a scene or a job: its jobs, those of them that have not ended, regions, webhooks that still wait, and bytes.
+    """Counts what goes with a scene or a job: its jobs, those of them that have not ended, regions, maps, waiting webhooks, and bytes.
 
     The bytes are those of proofs and cells. A job is not counted as its own dependent; the regions that a cover has grown are its jobs.
     """
@@ -45,11 +46,12 @@ class Dependents:
     jobs: int
     unfinished: int
     regions: int
+    maps: int
     webhooks: int
     bytes: int
 
     def __str__(self) -> str:
-        counts = {"job": self.jobs, "region": self.regions, "waiting webhook": self.webhooks}
+        counts = {"job": self.jobs, "region": self.regions, "map": self.maps, "waiting webhook": self.webhooks}
         counted = ", ".join(_number(count, name) for name, count in counts.items() if count)
         return f"{counted} and {self.bytes / 1e6:.1f} MB of proofs and cells"
 
@@ -103,7 +105,7 @@ def delete_job(session: Session, job_id: str, *, dependents: bool) -> None:
     if job.id != job_id:
         raise CirisError("job_not_found", f"no job has the id {job_id!r}", field="job", hint="give all of its id to delete it")
     found = of_job(session, job.id)
-    _check(found, found.jobs + found.regions + found.webhooks, f"job {job_id}", dependents)
+    _check(found, found.jobs + found.regions + found.maps + found.webhooks, f"job {job_id}", dependents)
     _delete_jobs(session, _of_job(job.id))
 
 
@@ -150,22 +152,27 @@ def _of_job(job_id: str) -> ColumnElement[bool]:
 def _counted(session: Session, which: ColumnElement[bool]) -> Dependents:
     mine = select(JobRow.id).where(which)
     count = select(func.count()).select_from(JobRow).where(which)
+    stored = (JobRow.kind == "map", StepRow.kind == ACCEPT, StepRow.state == StepState.DONE)
     to_tell = (WebhookRow.job_id.in_(mine), WebhookRow.state == WebhookState.WAITING)
     return Dependents(
         jobs=session.scalar(count) or 0,
         unfinished=session.scalar(count.where(JobRow.state.in_(unfinished(JOB)))) or 0,
         regions=session.scalar(select(func.count()).select_from(RegionRow).where(RegionRow.job_id.in_(mine))) or 0,
+        maps=session.scalar(select(func.count()).select_from(StepRow).join(JobRow).where(JobRow.id.in_(mine), *stored)) or 0,
         webhooks=session.scalar(select(func.count()).select_from(WebhookRow).where(*to_tell)) or 0,
         bytes=_bytes(session, mine),
     )
 
 
 def _bytes(session: Session, mine: Select[str]) -> int:
-    """Returns the bytes of the proofs and cells of these jobs. A proof that several of them have counts once."""
+    """Returns the bytes of the proofs, cells and maps of these jobs. A proof that several of them have counts once."""
     digests = union(*(select(model.proof_digest).where(model.job_id.in_(mine)) for model in _PROVED))
     stored = session.scalar(select(func.sum(func.length(ProofRow.data))).where(ProofRow.digest.in_(digests)))
-    cells = session.scalar(select(func.sum(func.length(SubtreesRow.data))).where(SubtreesRow.job_id.in_(mine)))
-    return int(stored or 0) + int(cells or 0)
+    others = (
+        session.scalar(select(func.sum(func.length(model.data))).where(model.job_id.in_(mine)))
+        for model in (SubtreesRow, MapPieceRow, StepRow)
+    )
+    return int(stored or 0) + sum(int(size or 0) for size in others)
 
 
 def stored(session: Session, project: str) -> int:

@@ -1,4 +1,5 @@
-"""Steps are the pieces of a job that are not pairs: seeding, the polytope step, accepting a region, a look at what is covered, a motion."""
+"""Steps are the pieces of a job that are not pairs: seeding, the polytope step, accepting a region, a look at what is covered, a motion, a
+map and the pieces of its rounds."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from db import events, jobs, leases, proofs
 from db.models import JobRow, StepRow
-from db.states import ACCEPT, STEP, StepState, transition, unfinished
+from db.states import ACCEPT, PIECE, STEP, StepState, transition, unfinished
 
 UNFINISHED = unfinished(STEP)
 
@@ -41,13 +42,18 @@ def add(session: Session, job: JobRow, kind: str, input: dict[str, Any]) -> Step
     return step
 
 
-def claim(session: Session, job: JobRow, *, accepts: bool, lease_seconds: float) -> Claim | None:
+def claim(session: Session, job: JobRow, *, accepts: bool, lease_seconds: float, pieces: bool = False) -> Claim | None:
     """Claims the job's latest open step: one that accepts a region, or one that the job waits for. Returns None without one.
 
     The caller holds the job's lock.
+
+    Args:
+        pieces: whether to claim a piece of a map's round only.
     """
     query = select(StepRow).where(is_open(StepRow, job.id, accepts=accepts))
-    step = session.scalar(query.order_by(StepRow.turn.desc()).limit(1))
+    if pieces:
+        query = query.where(StepRow.kind == PIECE)
+    step = session.scalar(query.order_by(StepRow.turn.desc(), StepRow.id).limit(1))
     if step is None:
         return None
     attempt, deaths = step.attempts + 1, step.deaths
@@ -65,7 +71,8 @@ def save(session: Session, claim: Claim, state: StepState, report: dict[str, Any
         return False
     job = jobs.get(session, claim.job_id)
     jobs.charge(session, job, seconds)
-    events.emit(session, job, "step", {"kind": claim.kind, "state": state, "seconds": seconds})
+    if claim.kind != PIECE:
+        events.emit(session, job, "step", {"kind": claim.kind, "state": state, "seconds": seconds})
     if claim.kind == ACCEPT and state == StepState.DONE:
         turn = select(StepRow.turn).where(StepRow.id == claim.step_id).scalar_subquery()
         earlier = (StepRow.job_id == job.id, StepRow.kind == ACCEPT, StepRow.turn < turn)
@@ -74,7 +81,7 @@ def save(session: Session, claim: Claim, state: StepState, report: dict[str, Any
 
 
 def keep_proof(session: Session, claim: Claim, proof: bytes) -> None:
-    """Stores the proof of the motion that the step has certified. The caller holds the job's lock."""
+    """Stores the proof of the motion or the map that the step has certified. The caller holds the job's lock."""
     session.get_one(StepRow, claim.step_id).proof_digest = proofs.put(session, [proof])[proof]
 
 

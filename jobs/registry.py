@@ -7,7 +7,8 @@ from jobs.certify_path import CertifyPath
 from jobs.cover import Cover
 from jobs.grow import Grow
 from jobs.kind import Kind
+from jobs.map import Map
 from jobs.recertify import Recertify
 
-KINDS: dict[str, Kind] = {kind.name: kind for kind in (Grow(), Certify(), Recertify(), CertifyPath(), Cover())}
+KINDS: dict[str, Kind] = {kind.name: kind for kind in (Grow(), Certify(), Recertify(), CertifyPath(), Cover(), Map())}
 """name -> kind"""

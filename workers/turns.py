@@ -18,7 +18,7 @@ from certifier.errors import CirisError
 from certifier.growth.actions import Finish
 from certifier.jobs.driver import drive
 from certifier.outcome import Outcome
-from db import clock, jobs, pairs, steps, subtrees, traces, work
+from db import clock, jobs, maps, pairs, steps, subtrees, traces, work
 from db.models import JobRow
 from db.settings import settings
 from db.states import ACCEPT, JOB, STEP, JobState, StepState, unfinished
@@ -126,12 +126,14 @@ def _finish(session: Session, kind: Kind, job: JobRow, finish: Finish, afterward
     refused = next((step.report for step in rows if step.kind == ACCEPT and step.state == StepState.FAILED), None)
     failed = next((step.report for step in reversed(rows) if step.state == StepState.FAILED), None)
     subtrees.end(session, job.id)
+    maps.end(session, job.id)
     if job.parent_id is not None:
         afterwards.append(partial(send_coordinate, job.parent_id))
     if job.state == JobState.CANCELLING:
         jobs.finish(session, job, JobState.CANCELLED, reason=finish.reason)
     elif refused is not None:
-        jobs.finish(session, job, JobState.FAILED, outcome=Outcome.ERROR, reason="the proof of a region was refused", error=refused)
+        why = "the verifier refused the proof" if refused["code"].startswith("proof") else "the proof could not be stored"
+        jobs.finish(session, job, JobState.FAILED, outcome=Outcome.ERROR, reason=why, error=refused)
     else:
         error = kind.failure(finish, job.error or failed)
         state = JobState.SUCCEEDED if error is None else JobState.FAILED

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated
 
@@ -13,6 +14,7 @@ from api import answers, checks, graph
 from api.access import READ, Db
 from api.answers import asked
 from api.children import Children
+from api.free_sets import KeptFreeSets, Mapped
 from api.libraries import KeptLibraries, Libraries
 from api.motions import KeptMotions
 from api.named import with_positions
@@ -29,11 +31,13 @@ from api.schemas.planning import (
     NearestResponse,
     PathRequest,
     PathResponse,
+    Piece,
     SegmentRequest,
     SegmentResponse,
 )
 from certifier.model import Array, Scene
 from certifier.motion.splines import Curve, curve
+from certifier.outcome import Guarantee
 from db.session import Database
 from planner.library import Library
 from planner.membership import locate, to_s
@@ -47,8 +51,8 @@ router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ]
 
 @router.post("/contains")
 @asking(few=100)
-def contains(body: ContainsRequest, db: Db, libraries: KeptLibraries, motions: KeptMotions) -> ContainsResponse:
-    """Returns, for each point, the certified regions that contain it, how deep inside it is, and the motions whose tubes contain it."""
+def contains(body: ContainsRequest, db: Db, libraries: KeptLibraries, motions: KeptMotions, free_sets: KeptFreeSets) -> ContainsResponse:
+    """Returns what proves each point free: certified regions with how deep inside it is, tubes of proved motions, the latest map."""
     scene_id, scene, library = asked(db, libraries, body.scene)
     body = with_positions(db, scene_id, scene, body)
     points = _points(scene, body.q, body.s)
@@ -56,14 +60,17 @@ def contains(body: ContainsRequest, db: Db, libraries: KeptLibraries, motions: K
     tubes = motions.of(db, scene_id, scene).tubes
     q = np.array(body.q) if body.q is not None else scene.to_q(points)
     ends = np.searchsorted(found.point, np.arange(len(points) + 1)).tolist()
+    mapped = free_sets.of(db, scene_id)
+    proved = [None] * len(q) if mapped is None else mapped.free.contains(scene.in_windows(q)).tolist()
     containments = []
-    for (begin, end), at in zip(pairwise(ends), q, strict=True):
+    for (begin, end), at, by_map in zip(pairwise(ends), q, proved, strict=True):
         deepest = zip(found.region[begin:end].tolist(), found.margin[begin:end].tolist(), strict=True)
         hits = [Hit(region=library.ids[i], margin=margin, guarantee=answers.guarantee(library, i)) for i, margin in deepest]
         inside = list(dict.fromkeys(tubes.motions[i].id for i in tubes.motion[tubes.at(at)[0]].tolist()))
         margin = hits[0].margin if hits else None
-        containments.append(Containment(inside=bool(hits or inside), regions=hits, margin=margin, motions=inside))
-    return ContainsResponse(scene=scene_id, version=library.version, regions=len(library), points=containments)
+        containments.append(Containment(inside=bool(hits or inside or by_map), regions=hits, margin=margin, motions=inside, map=by_map))
+    job = None if mapped is None else mapped.job
+    return ContainsResponse(scene=scene_id, version=library.version, regions=len(library), map=job, points=containments)
 
 
 @router.post("/nearest")
@@ -80,18 +87,21 @@ def find_nearest(body: NearestRequest, db: Db, libraries: KeptLibraries) -> Near
 
 @router.post("/segment")
 @asking(few=20)
-def cover_segments(body: SegmentRequest, db: Db, libraries: KeptLibraries, motions: KeptMotions) -> SegmentResponse:
-    """Says of each straight motion whether every point of it is in certified regions, and which.
+def cover_segments(
+    body: SegmentRequest, db: Db, libraries: KeptLibraries, motions: KeptMotions, free_sets: KeptFreeSets
+) -> SegmentResponse:
+    """Says of each straight motion whether every point of it is proved to be free, and what proves it.
 
+    The scene's latest map is asked about motions that are straight in `q`, and certified regions and tubes of motions about all others.
     `covered` is proved, for the numbers of the request taken literally. A motion that is straight in `s` is cut with the regions exactly.
     One that is straight in `q` is proved piece by piece, with bounds on what lies between, so one that only touches may not be proved.
     """
     scene_id, scene, library = asked(db, libraries, body.scene)
     body = with_positions(db, scene_id, scene, body)
-    tubes = motions.of(db, scene_id, scene).tubes
+    proofs = library, motions.of(db, scene_id, scene).tubes, free_sets.of(db, scene_id)
     given, name = (body.q, "q") if body.q is not None else (body.s or [], "s")
     segments = [
-        _covering(library, tubes, scene, body.space, _waypoints(scene, body.space, ends, f"{name}[{i}]", name), [0.0, 1.0])
+        _covering(*proofs, scene, body.space, _waypoints(scene, body.space, ends, f"{name}[{i}]", name), [0.0, 1.0])
         for i, ends in enumerate(given)
     ]
     return SegmentResponse(scene=scene_id, version=library.version, regions=len(library), segments=segments)
@@ -99,8 +109,8 @@ def cover_segments(body: SegmentRequest, db: Db, libraries: KeptLibraries, motio
 
 @router.post("/path")
 @asking(few=20)
-def cover_path(body: PathRequest, db: Db, libraries: KeptLibraries, motions: KeptMotions) -> PathResponse:
-    """Says whether every point of a path, straight between its waypoints or along a curve, is in certified regions, and which.
+def cover_path(body: PathRequest, db: Db, libraries: KeptLibraries, motions: KeptMotions, free_sets: KeptFreeSets) -> PathResponse:
+    """Says whether every point of a path, straight between its waypoints or along a curve, is proved to be free, and what proves it.
 
     With `times` the path is a trajectory, and the answer is in its times. What `covered` means is said at `/v1/planning/segment`.
     """
@@ -108,8 +118,8 @@ def cover_path(body: PathRequest, db: Db, libraries: KeptLibraries, motions: Kep
     body = with_positions(db, scene_id, scene, body)
     found = _curve(scene, body)
     times = body.times or (np.arange(len(found.controls) // found.degree + 1.0) if found.times is None else found.times).tolist()
-    tubes = motions.of(db, scene_id, scene).tubes
-    answer = _covering(library, tubes, scene, body.space, found.controls, times, found.degree)
+    proofs = library, motions.of(db, scene_id, scene).tubes, free_sets.of(db, scene_id)
+    answer = _covering(*proofs, scene, body.space, found.controls, times, found.degree)
     return PathResponse(scene=scene_id, version=library.version, regions=len(library), **dict(answer))
 
 
@@ -155,8 +165,29 @@ def _curve(scene: Scene, body: PathRequest) -> Curve:
 
 
 def _covering(
-    library: Library, tubes: Tubes, scene: Scene, space: Space, controls: Array, times: Sequence[float], degree: int = 1
+    library: Library,
+    tubes: Tubes,
+    mapped: Mapped | None,
+    scene: Scene,
+    space: Space,
+    controls: Array,
+    times: Sequence[float],
+    degree: int = 1,
 ) -> Covering:
-    found = follow(library, scene, space, controls, times, degree, tubes)
-    stop = answers.uncovered(library, scene, found.uncovered)
-    return Covering(covered=stop is None, pieces=answers.pieces(library, tubes, found.stretches), uncovered=stop)
+    """Covers a motion from its start on. The map covers whole segments between two waypoints, and regions and tubes the rows of others."""
+    last = (len(controls) - 1) // degree
+    by_map = np.zeros(last, bool)
+    if mapped is not None and degree == 1 and space is Space.Q:
+        by_map = mapped.free.contains_motion(controls[:-1], controls[1:])
+    pieces: list[Piece] = []
+    for begin, end in pairwise([0, *(np.flatnonzero(np.diff(by_map)) + 1).tolist(), last]):
+        if by_map[begin] and mapped is not None:
+            pieces.append(Piece(begin=times[begin], end=times[end], region=None, map=mapped.job, guarantee=Guarantee.EXACT))
+            continue
+        part = controls[begin * degree : end * degree + 1]
+        found = follow(library, scene, space, part, times[begin : end + 1], degree, tubes)
+        pieces += answers.pieces(library, tubes, found.stretches)
+        if found.uncovered is not None:
+            stop = replace(found.uncovered, segment=begin + found.uncovered.segment)
+            return Covering(covered=False, pieces=pieces, uncovered=answers.uncovered(library, scene, stop))
+    return Covering(covered=True, pieces=pieces, uncovered=None)

@@ -17,6 +17,7 @@ MAX_SEGMENTS = MAX_WAYPOINTS = 500
 
 SCENE, REGION = "planar-2dof", "1f0c6d4e-6d0e-4f0e-9a51-0c1f5d0a7b11"
 MOTION = "5b8f8d6e-27a5-4f1c-9a83-6a1a2d0f2d6e"
+MAP = "0d6f0f5e-52c7-4a3f-8d5c-0b7f7a9f3c21"
 
 POINTS_IN_Q = "(k, n), joint positions in radians or metres, one row a point."
 POINTS_IN_S = "(k, n), tangent-space coordinates s, one row a point."
@@ -28,6 +29,7 @@ Q = Annotated[list[float], Field(description="(n,), joint positions in radians o
 S = Annotated[list[float], Field(description="(n,), tangent-space coordinates.", examples=[[0.2027, 0.1511]])]
 RegionId = Annotated[str, Field(description="Id of a region.", examples=[REGION])]
 MotionId = Annotated[str, Field(description="Id of a proved motion.", examples=[MOTION])]
+MapJob = Annotated[str, Field(description="Id of a job that has grown a map.", examples=[MAP])]
 Distance = Annotated[float, Field(description="Euclidean distance in s.", examples=[0.05])]
 
 
@@ -177,14 +179,19 @@ class Hit(BaseModel):
 class Containment(BaseModel):
     """Answers for one point."""
 
-    inside: bool = Field(description="Whether some region, or the tube of some motion, contains the point.", examples=[True])
+    inside: bool = Field(
+        description="Whether some region, the tube of some motion, or the scene's latest map proves the point free.", examples=[True]
+    )
     regions: list[Hit] = Field(description="The regions that contain the point, the one with the largest margin first.")
     margin: float | None = Field(description="The largest margin; null where no region contains the point.", examples=[0.05])
     motions: list[MotionId] = Field(description="The proved motions whose tubes contain the point.")
+    map: bool | None = Field(description="Whether the scene's latest map proves the point free; null where the scene has no map.")
 
 
 class ContainsResponse(Answer):
     """Holds one answer for each point, in order."""
+
+    map: MapJob | None = Field(description="The job that has grown the scene's latest map; null where the scene has none.")
 
     points: list[Containment] = Field(description="One answer for each point, in order.")
 
@@ -215,15 +222,18 @@ class NearestResponse(Answer):
 
 
 class Piece(BaseModel):
-    """Says what proves that the motion is free between two times: a region that contains it, or the tube of a proved motion."""
+    """Says what proves that the motion is free between two times: a region that contains it, the tube of a proved motion, or a map."""
 
     begin: float = Field(description="Time at which the piece begins; the doubles nearest to the exact ends are shown.", examples=[0.0])
     end: float = Field(description="Time at which the piece ends, and the next begins.", examples=[0.625])
     region: RegionId | None = Field(
-        description="The region that contains the motion here; null where a motion's tube does.", examples=[REGION]
+        description="The region that contains the motion here; null where a motion's tube or a map proves it.", examples=[REGION]
     )
     motion: MotionId | None = Field(
-        default=None, description="The proved motion whose tube contains the motion here; null for a region.", examples=[MOTION]
+        default=None, description="The proved motion whose tube contains the motion here; null for a region or a map.", examples=[MOTION]
+    )
+    map: MapJob | None = Field(
+        default=None, description="The job whose map proves the motion here, from one waypoint to another; null for the others."
     )
     guarantee: Guarantee = Field(description="What the certificate is worth.", examples=["exact"])
 
@@ -241,10 +251,10 @@ class Uncovered(BaseModel):
 
 
 class Covering(BaseModel):
-    """Says whether every point of a motion is in certified regions."""
+    """Says whether every point of a motion is proved to be free: by certified regions, proved motions, or the scene's latest map."""
 
     covered: bool = Field(description="True only if this is proved, for the numbers of the request taken literally.", examples=[True])
-    pieces: list[Piece] = Field(description="The regions that cover the motion, in order, as far as it is covered from its start on.")
+    pieces: list[Piece] = Field(description="What covers the motion, in order, as far as it is covered from its start on.")
     uncovered: Uncovered | None = Field(description="Where the motion stops being covered; null where it is covered.")
 
 

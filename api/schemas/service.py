@@ -88,6 +88,7 @@ class Dependents(BaseModel):
     jobs: int = Field(description="Jobs of the scene, or those that a cover has made.")
     unfinished: int = Field(description="Jobs that have not ended, the job itself included. Nothing is deleted before they have.")
     regions: int = Field(description="Certified regions.")
+    maps: int = Field(description="Maps that are stored.")
     webhooks: int = Field(description="Webhooks that wait: receivers that were not told yet that a job has ended, and would never be.")
     bytes: int = Field(description="Bytes of proofs and cells.")
 

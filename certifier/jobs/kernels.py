@@ -13,6 +13,8 @@ import numpy as np
 
 from certifier.growth.options import GrowthOptions
 from certifier.jobs import local, motion
+from certifier.jobs.map import grow_map
+from certifier.map.free_set import free_set
 from certifier.seeding.arm import AT, NEAR, arm
 from certifier.seeding.iris import iris
 from certifier.seeding.options import SeedOptions
@@ -22,8 +24,12 @@ PART = 0.6
 """The faces of the proposal are moved to this part of their distance from the seed: all that is left is certified at once."""
 
 
+COVERED = 0.05
+"""The map of the arm ends when it covers this share."""
+
+
 def warm_up() -> None:
-    """Grows regions of a small arm, in both ways, while another process certifies a motion. Drake is not loaded.
+    """Grows regions of a small arm, in both ways, and a map, while another process certifies a motion. Drake is not loaded.
 
     Motions are certified by children of workers, so it is enough that what they call is kept.
     """
@@ -36,4 +42,5 @@ def warm_up() -> None:
     proposal = Proposal(C, nearer, center[0], contain, {**account, "seconds": 0.0})
     for asked in ({"stages": 1}, {"paper": {"pushes": 1}}):
         local.grow(scene, GrowthOptions.from_document({"seed": {"q": AT}, **asked}), propose=lambda _: proposal)
+    free_set(grow_map(scene, coverage=COVERED).proof)
     motions.join()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import multiprocessing
 import os
 import signal
@@ -16,16 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from certifier.map.growing import Coverage, Growing, Task
+from certifier.map.growing import Coverage, Growing, Task, Trees
 from certifier.map.pair import Found, PairTree
-from certifier.map.trees import Pairs
+from certifier.map.trees import Pairs, Plan
 from certifier.model import Array, Scene
 from certifier.orphans import die_with_parent
 from certifier.proof.map import MapProof
 
 Tell = Callable[[str, dict[str, Any]], None]
-Work = Callable[[Sequence[Task]], Iterator[Found]]
-"""Works on tasks, and gives the results in their order."""
+Work = Callable[[Sequence[Task]], Iterator[tuple[Task, Found]]]
+"""Works on tasks, and gives each of them with what was found, in their order; perhaps not all of them, where the time is over."""
 
 
 @dataclass(frozen=True)
@@ -61,45 +60,63 @@ def grow_map(
     tell: Tell = lambda *_: None,
     at: Array | None = None,
     seed: int = 0,
+    former: MapProof | None = None,
 ) -> SceneMap:
     """Grows the map of a scene until it covers this share, or the time is over, or somebody interrupts it.
 
     Args:
         coverage: share of the free configurations to cover.
         at: (D, n) configurations in s that are wanted first.
+        former: a map of this scene or another one, which has passed the verifier. What it proves of the same bodies is taken over.
     """
     start = time.perf_counter()
-    end = math.inf if deadline_s is None else start + deadline_s
     at = np.zeros((0, scene.n)) if at is None else at
     with _interrupts() as interrupted:
-        growing = Growing(scene, at, seed)
-        with _workers(scene, growing, processes) as work:
+
+        def over() -> str | None:
+            late = deadline_s is not None and time.perf_counter() > start + deadline_s
+            return "interrupted" if interrupted() else "deadline" if late else None
+
+        def told() -> None:
+            now, seconds = growing.coverage, time.perf_counter() - start
+            said = {"seconds": seconds, "coverage": now.share, "error": now.error, "cells": growing.planes, "looked": growing.looked}
+            tell("map", said)
+
+        growing = Growing(scene, at, seed, former)
+        with _workers(scene, growing, processes, over) as work:
             try:
-                reason = _grown(growing, work, coverage, start, end, interrupted, tell)
+                while (reason := grow_round(growing, work, coverage, over)) is None:
+                    if not over():
+                        told()
             except BrokenProcessPool:
                 reason = "worker_lost"
         proof, seconds = growing.proof(), time.perf_counter() - start
-    wanted = np.where(growing.contains(at), "proved", np.where(growing.is_free(at), "open", "in_collision")).tolist()
+    wanted = states_of(growing, at)
     return SceneMap(proof, growing.coverage, growing.looked, growing.planes, growing.refused, wanted, seconds, reason)
 
 
-def _grown(growing: Growing, work: Work, coverage: float, start: float, end: float, interrupted: Callable[[], bool], tell: Tell) -> str:
-    """Grows a map until it covers enough, or the time is over, and returns why it ended. A task is taken as a whole or not at all."""
-    while tasks := growing.round():
-        for task, found in zip(tasks, work(tasks), strict=True):
-            growing.take(task, found)
-            if growing.full:
-                return "size"
-            if interrupted():
-                return "interrupted"
-            if time.perf_counter() > end:
-                return "deadline"
-        now = growing.coverage
-        seconds = time.perf_counter() - start
-        tell("map", {"seconds": seconds, "coverage": now.share, "error": now.error, "cells": growing.planes, "looked": growing.looked})
-        if now.share >= coverage:
-            return "coverage"
-    return "nothing_left"
+def states_of(trees: Trees, at: Array) -> list[str]:
+    """Returns ``proved``, ``open`` or ``in_collision`` for configurations, (D, n) in s."""
+    free = Plan(trees.scene).free(at)
+    return np.where(trees.contains(at), "proved", np.where(free, "open", "in_collision")).tolist()
+
+
+def grow_round(growing: Growing, work: Work, coverage: float, over: Callable[[], str | None]) -> str | None:
+    """Grows a map by one round, or returns why it has ended before this one. A task is taken as a whole or not at all.
+
+    Args:
+        over: says why the map is to end now, or returns None.
+    """
+    if growing.coverage.share >= coverage:
+        return "coverage"
+    if reason := ("size" if growing.full else over()):
+        return reason
+    tasks = growing.round()
+    for task, found in work(tasks) if tasks else ():
+        growing.take(task, found)
+        if growing.full:
+            break
+    return None if tasks else "nothing_left"
 
 
 @contextmanager
@@ -119,7 +136,7 @@ def _interrupts() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-class _Worker:
+class Worker:
     """Works on tasks, and keeps the trees that it was asked for."""
 
     def __init__(self, scene: Scene, known: dict[Pairs, PairTree]) -> None:
@@ -134,25 +151,33 @@ class _Worker:
 
 
 @contextmanager
-def _workers(scene: Scene, growing: Growing, processes: int) -> Iterator[Work]:
-    """Yields what works on tasks."""
-    worker = _Worker(scene, {pairs: tree.pair for pairs, tree in growing.trees.items()})
+def _workers(scene: Scene, growing: Growing, processes: int, over: Callable[[], str | None]) -> Iterator[Work]:
+    """Yields what works on tasks until the time is over."""
+    worker = Worker(scene, {pairs: tree.pair for pairs, tree in growing.trees.items()})
     if processes == 1:
-        yield lambda tasks: map(worker, tasks)
+        yield lambda tasks: _until(over, ((task, worker(task)) for task in tasks))
         return
     # The children are forked, so they have the trees without making them.
     with ProcessPoolExecutor(processes, multiprocessing.get_context("fork"), _adopt, (worker, os.getpid())) as executor:
         try:
-            yield lambda tasks: executor.map(_run, tasks)
+            yield lambda tasks: _until(over, zip(tasks, executor.map(_run, tasks), strict=True))
         finally:
             executor.shutdown(cancel_futures=True)
 
 
-_adopted: list[_Worker] = []
+def _until(over: Callable[[], str | None], done: Iterator[tuple[Task, Found]]) -> Iterator[tuple[Task, Found]]:
+    """Yields what is done, and ends after what is done when the time is over."""
+    for one in done:
+        yield one
+        if over():
+            return
+
+
+_adopted: list[Worker] = []
 """This holds the worker of the parent of this process, so that it need not travel to it."""
 
 
-def _adopt(worker: _Worker, parent: int) -> None:
+def _adopt(worker: Worker, parent: int) -> None:
     die_with_parent(parent=parent)  # the children hold one another's pipes open, so none of these would end
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal interrupts children too, but their parent says when they end
     _adopted.append(worker)

@@ -13,7 +13,7 @@ class JobOptions:
 
     deadline_seconds: float | None = option(
         None,
-        "The job ends this many seconds after its creation, with its regions so far.",
+        "The job ends this many seconds after its creation, with what is proved so far.",
         otherwise="no deadline",
         argument="deadline",
         unit="s",

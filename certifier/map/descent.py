@@ -53,6 +53,10 @@ class Descent:
         nodes, cuts, numbers = preorder(self.kinds, self.values, self.children, self.size, 1)
         return nodes, cuts, self.planes[numbers[nodes == PLANE]]
 
+    def boxes(self, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Returns the bounds of the open nodes, in preorder, (C, k) each, where the root has these, (k,) each."""
+        return boxes(self.kinds, self.values, self.children, lower, upper)
+
     def leaves(self, X: Array) -> Array:
         """Returns the numbers of the leaves that points lie in, (N,); a point on a cut is in the lower part.
 
@@ -143,4 +147,52 @@ def in_order(pieces: Array, ends: Array, which: Array) -> Array:
         part = pieces[(ends[i - 1] if i else 0) : ends[i]]
         found[at : at + len(part)] = part
         at += len(part)
+    return found
+
+
+@njit(cache=True)
+def boxes(kinds: Array, values: Array, children: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
+    """Returns the bounds of the open leaves of a tree, in preorder, (C, k) each.
+
+    Args:
+        lower, upper: (k,) the bounds of the root.
+    """
+    lowers, uppers, waiting = [lower], [upper], [0]
+    found_lower, found_upper = [lower], [upper]
+    while len(waiting):
+        node, low, high = waiting.pop(), lowers.pop(), uppers.pop()
+        joint = kinds[node]
+        if joint >= 0:
+            below, above = high.copy(), low.copy()
+            below[joint] = above[joint] = values[node]
+            waiting.extend([children[node, 1], children[node, 0]])
+            lowers.extend([above, low])
+            uppers.extend([high, below])
+        elif joint == OPEN:
+            found_lower.append(low)
+            found_upper.append(high)
+    many = len(found_lower) - 1
+    all_lower, all_upper = np.empty((many, len(lower))), np.empty((many, len(lower)))
+    for i in range(many):
+        all_lower[i], all_upper[i] = found_lower[i + 1], found_upper[i + 1]
+    return all_lower, all_upper
+
+
+@njit(cache=True)
+def lengths_of(pieces: Array, vertices: Array) -> Array:
+    """Returns how many nodes of pieces, and how many pieces, each plane has, (P, 2).
+
+    Args:
+        pieces: a tree for each vertex of each plane, one after the other.
+        vertices: (P,) how many vertices each plane separates.
+    """
+    found, at = np.zeros((len(vertices), 2), np.int64), 0
+    for plane in range(len(vertices)):
+        for _ in range(vertices[plane]):
+            left = 1
+            while left:
+                left += 1 if pieces[at] >= 0 else -1
+                found[plane, 0] += 1
+                found[plane, 1] += pieces[at] < 0
+                at += 1
     return found

@@ -7,6 +7,7 @@ the trees that are about it; pairs with the same ones share a clause.
 from __future__ import annotations
 
 import base64
+import hashlib
 import io
 import json
 from collections.abc import Sequence
@@ -49,6 +50,20 @@ def of_file(payload: dict[str, Any]) -> dict[str, Any]:
     np.savez_compressed(written, **arrays)
     file = base64.b64encode(written.getvalue()).decode()
     return {"name": proof.scene.name, "cells": statement.cells, "nodes": len(arrays["joint"]), "free_set": file}
+
+
+def checked(payload: dict[str, Any]) -> dict[str, Any]:
+    """Checks a map's file, in a child process, and returns the ``sha256`` of the file that holds.
+
+    Args:
+        payload: as for :func:`of_file`.
+
+    Raises:
+        CirisError, ProofError: as :func:`of_file`.
+    """
+    data = read_file(payload["path"])
+    verify_map(data, payload["processes"])
+    return {"sha256": hashlib.sha256(data).hexdigest()}
 
 
 def free_set(proof: MapProof) -> dict[str, Any]:

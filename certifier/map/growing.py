@@ -17,7 +17,7 @@ from certifier.map.pair import Found, OpenCells, PairTree
 from certifier.map.trees import Pairs, Plan
 from certifier.model import Array, Scene
 from certifier.proof import limits
-from certifier.proof.map import MapProof
+from certifier.proof.map import MapProof, PairMap
 from certifier.proof.partition import PLANE
 
 HELD, FIRST, MOST_BATCHES = 4000, 8000, 16
@@ -80,10 +80,23 @@ class Tree:
     found: list[tuple[Array, Array, Array, Array]]
 
     @classmethod
-    def of(cls, pair: PairTree) -> Tree:
+    def of(cls, pair: PairTree, former: PairMap | None = None) -> Tree:
+        """Returns a tree without cuts, or one that goes on with a former map of the same pairs, where that has the same volumes."""
         none = np.zeros(0, np.int8)
         found = [(np.zeros((0, 5, 1 + pair.scene.n)), none, none, np.zeros((0, 2), np.int64))]
-        return cls(pair, Descent(), pair.root(np.zeros(0, np.int64)), np.zeros(1, np.int64), found)
+        tree = cls(pair, Descent(), pair.root(np.zeros(0, np.int64)), np.zeros(1, np.int64), found)
+        if former is not None and pair.is_of(former):
+            tree.nodes = tree.descent.add(tree.nodes, former.nodes, former.cuts)
+            tree.cells = pair.cells(*tree.descent.boxes(*(bounds[0] for bounds in tree.cells[:2])))
+            tree.found.append((former.planes, former.choices, former.pieces, pair.lengths(former)))
+        return tree
+
+    @property
+    def bytes(self) -> int:
+        """Returns about how many bytes the tree has in a proof."""
+        return int(
+            9 * self.descent.size + sum(part.nbytes + pieces.nbytes + 2 * lengths[:, 1].sum() for part, _, pieces, lengths in self.found)
+        )
 
     def insert(self, numbers: Array, samples: Array) -> Array:
         """Adds samples, (S, n) with these numbers, to the open cells that they lie in, and returns the numbers of those that do."""
@@ -114,26 +127,84 @@ class Tree:
         self.found.append((found.planes, found.choices, found.pieces, found.lengths))
 
 
-class Growing:
+class Trees:
+    """The trees of a map of a scene.
+
+    Args:
+        former: a map of this scene or another one. Trees about the same bodies on the same joints go on with what it proves.
+
+    Attributes:
+        trees: those that work is or was done on.
+        taken_over: those that go on with the former map, in the order in which they came.
+    """
+
+    def __init__(self, scene: Scene, former: MapProof | None = None) -> None:
+        self.scene, self.trees, self.taken_over = scene, dict[Pairs, Tree](), list[Pairs]()
+        self._former = {} if former is None else {part.scene.hash: part for part in former.maps}
+
+    def tree(self, pairs: Pairs) -> Tree:
+        """Returns the tree of some pairs, a new one if there is none."""
+        if pairs not in self.trees:
+            pair = PairTree(self.scene, pairs)
+            tree = self.trees[pairs] = Tree.of(pair, self._former.get(pair.scene.hash))
+            if len(tree.found) > 1:
+                self.taken_over.append(pairs)
+        return self.trees[pairs]
+
+    @property
+    def planes(self) -> int:
+        """Returns how many cells are proved."""
+        return sum(tree.descent.held for tree in self.trees.values())
+
+    def contains(self, samples: Array) -> Array:
+        """Returns which configurations, (S, n) in s, are proved to be free, (S,)."""
+        proved: dict[object, Array] = {pair: np.zeros(len(samples), dtype=bool) for pair in self.scene.pairs}
+        for pairs, tree in self.trees.items():
+            leaves = tree.descent.leaves(np.ascontiguousarray(samples[:, tree.pair.positions]))
+            apart = tree.descent.kinds[leaves] == PLANE
+            for pair in pairs:
+                proved[pair] |= apart
+        return np.logical_and.reduce(list(proved.values())) if proved else np.ones(len(samples), dtype=bool)
+
+    def proof(self) -> MapProof:
+        """Returns the map as a proof, with the trees that something was found for, in the order of their pairs."""
+        number = {pair: i for i, pair in enumerate(self.scene.pairs)}
+        worked = [pairs for pairs, tree in self.trees.items() if len(tree.found) > 1]
+        worked.sort(key=lambda pairs: [number[pair] for pair in pairs])
+        maps = []
+        for pairs in worked:
+            tree = self.trees[pairs]
+            nodes, cuts, held = tree.descent.in_order()
+            planes, choices, pieces, lengths = (np.concatenate(parts) for parts in zip(*tree.found, strict=True))
+            ordered = in_order(pieces, np.cumsum(lengths[:, 0]), held)
+            maps.append(tree.pair.proof(nodes, cuts, planes[held], choices[held], ordered, lengths[held]))
+        return MapProof(self.scene, tuple(worked), tuple(maps))
+
+
+class Growing(Trees):
     """A map that grows.
 
     Args:
         at: (D, n) configurations in s that are wanted first; those in collision are left out.
         seed: of every random choice.
+        former: as for :class:`Trees`.
 
     Attributes:
         looked: how many cells were looked at.
         refused: how many tasks were given up because the verifier refused what they found.
     """
 
-    def __init__(self, scene: Scene, at: Array, seed: int = 0) -> None:
-        self._scene, self._rng = scene, np.random.default_rng(seed)
+    def __init__(self, scene: Scene, at: Array, seed: int = 0, former: MapProof | None = None) -> None:
+        super().__init__(scene, former)
+        self._rng = np.random.default_rng(seed)
         self._samples, self._value = np.zeros((0, scene.n)), np.zeros(0)
-        self._open, self.trees, self.looked = np.zeros(0, np.int64), dict[Pairs, Tree](), 0
+        self._open, self.looked = np.zeros(0, np.int64), 0
         self._plan, self._bytes, self.refused = Plan(scene), 0, 0
-        self._add(self._free(FIRST), 1.0)
-        self._held = slice(len(self._samples), len(self._samples) + self._add(self._free(HELD), 0.0))
+        first, held = self._free(FIRST), self._free(HELD)  # before there are trees, so that what a former map proves is among them
+        self._add(first, 1.0)
+        self._held = slice(len(first), len(first) + self._add(held, 0.0))
         self._add(at[self._plan.free(at)], DEMAND)
+        self._bytes = sum(tree.bytes for tree in self.trees.values())
 
     @property
     def coverage(self) -> Coverage:
@@ -148,15 +219,6 @@ class Growing:
     def full(self) -> bool:
         """Returns whether the verifier would not read a larger map."""
         return self._bytes > FULL * limits.UNPACKED_BYTES or len(self.trees) >= limits.PROOFS
-
-    def is_free(self, samples: Array) -> Array:
-        """Returns which configurations, (S, n) in s, are shown to be free of collision, (S,); the map does not matter."""
-        return self._plan.free(samples)
-
-    @property
-    def planes(self) -> int:
-        """Returns how many cells are proved."""
-        return sum(tree.descent.held for tree in self.trees.values())
 
     def round(self) -> list[Task]:
         """Returns the tasks of the next round, in an order that is always the same; none where nothing is left to do."""
@@ -190,16 +252,6 @@ class Growing:
         self.refused += found.looked == 0
         self._bytes += found.planes.nbytes + found.pieces.nbytes + 9 * len(found.nodes) + 2 * int(found.lengths[:, 1].sum())
 
-    def proof(self) -> MapProof:
-        """Returns the map as a proof."""
-        maps = []
-        for tree in self.trees.values():
-            nodes, cuts, held = tree.descent.in_order()
-            planes, choices, pieces, lengths = (np.concatenate(parts) for parts in zip(*tree.found, strict=True))
-            ordered = in_order(pieces, np.cumsum(lengths[:, 0]), held)
-            maps.append(tree.pair.proof(nodes, cuts, planes[held], choices[held], ordered, lengths[held]))
-        return MapProof(self._scene, tuple(self.trees), tuple(maps))
-
     def _task(self, name: Pairs, rows: Array, of_samples: Array, water: float) -> Task:
         tree = self.trees[name]
         given = tree.cells.some(rows)
@@ -213,16 +265,6 @@ class Growing:
         if np.count_nonzero((self._open > 0) & (self._value > 0)) < WANTED:
             self._add(self._drawn(BATCH), 1.0)
 
-    def contains(self, samples: Array) -> Array:
-        """Returns which configurations, (S, n) in s, are proved to be free, (S,)."""
-        proved: dict[object, Array] = {pair: np.zeros(len(samples), dtype=bool) for pair in self._scene.pairs}
-        for pairs, tree in self.trees.items():
-            leaves = tree.descent.leaves(np.ascontiguousarray(samples[:, tree.pair.positions]))
-            apart = tree.descent.kinds[leaves] == PLANE
-            for pair in pairs:
-                proved[pair] |= apart
-        return np.logical_and.reduce(list(proved.values())) if proved else np.ones(len(samples), dtype=bool)
-
     def _add(self, samples: Array, value: float) -> int:
         """Adds configurations, (S, n) in s and free of collision, which weigh this, and returns how many they are."""
         begin = len(self._samples)
@@ -230,9 +272,7 @@ class Growing:
         self._value = np.concatenate([self._value, np.full(len(samples), value)])
         self._open = np.concatenate([self._open, np.zeros(len(samples), np.int64)])
         for pairs, places in self._plan.assigned(samples).items():
-            if pairs not in self.trees:
-                self.trees[pairs] = Tree.of(PairTree(self._scene, pairs))
-            self._open[self.trees[pairs].insert(begin + places, samples[places])] += 1
+            self._open[self.tree(pairs).insert(begin + places, samples[places])] += 1
         return len(samples)
 
     def _free(self, count: int) -> Array:
@@ -246,7 +286,7 @@ class Growing:
 
     def _drawn(self, count: int) -> Array:
         """Draws configurations and returns those that are free of collision, and that the map does not prove yet, in s."""
-        q = self._rng.uniform(self._scene.q_lower, self._scene.q_upper, size=(count, self._scene.n))
-        samples = self._scene.to_s(q)
+        q = self._rng.uniform(self.scene.q_lower, self.scene.q_upper, size=(count, self.scene.n))
+        samples = self.scene.to_s(q)
         samples = samples[~self.contains(samples)] if self.trees else samples
         return samples[self._plan.free(samples)]

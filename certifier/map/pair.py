@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from certifier.errors import ProofError
 from certifier.kinematics import Kinematics
 from certifier.map import engine
-from certifier.map.descent import in_order, preorder
+from certifier.map.descent import in_order, lengths_of, preorder
 from certifier.map.settle import CONTACTS, LEVELS, Levels
 from certifier.model import Array, Box, Pair, Scene
 from certifier.partition.area import Area
@@ -21,7 +22,7 @@ from certifier.partition.together import volumes_of
 from certifier.partition.tree import ALL
 from certifier.proof.ground import Ground
 from certifier.proof.map import PairMap
-from certifier.proof.partition import OPEN, PLANE, choices_of
+from certifier.proof.partition import OPEN, PLANE, STREAMS, choices_of
 from certifier.proof.sub_scene import sub_scene
 from certifier.verify.partition import PartitionCheck
 
@@ -99,6 +100,14 @@ class Found(NamedTuple):
     left: OpenCells
 
     @classmethod
+    def of_none(cls, k: int) -> Found:
+        """Returns what is found of no cells, of k joints."""
+        none = np.zeros((0, k))
+        return cls.nothing(
+            OpenCells(none, none, none[:, 0], np.zeros((0, CONTACTS, k)), none[:, 0], np.zeros(1, np.int64), np.zeros(0, np.int64))
+        )
+
+    @classmethod
     def nothing(cls, given: OpenCells) -> Found:
         """Returns the cells as they were, but that they are not looked at any more."""
         C, k = given.lower.shape
@@ -135,9 +144,26 @@ class PairTree:
 
     def root(self, numbers: Array) -> OpenCells:
         """Returns the cell of all configurations within the joint limits, with samples of these numbers."""
-        one, lower, upper = np.zeros(1, np.int64), self._area.lower, self._area.upper
-        contacts = np.zeros((1, CONTACTS, len(lower)))
-        return OpenCells(lower[None].copy(), upper[None].copy(), one + ALL, contacts, one, np.array([0, len(numbers)]), numbers)
+        cells = self.cells(self._area.lower[None].copy(), self._area.upper[None].copy())
+        return cells._replace(samples=np.array([0, len(numbers)]), numbers=numbers)
+
+    def cells(self, lower: Array, upper: Array) -> OpenCells:
+        """Returns open cells with these bounds, (C, k) each, of which nothing is known, without samples."""
+        C, k = lower.shape
+        none = np.zeros(C, np.int64)
+        return OpenCells(lower, upper, none + ALL, np.zeros((C, CONTACTS, k)), none, np.zeros(C + 1, np.int64), none[:0])
+
+    def is_of(self, former: PairMap) -> bool:
+        """Says whether a map is about the very volumes and frame of this tree, so that the tree may go on with it."""
+        none = {name: getattr(former, name)[:0] for name in STREAMS}
+        lengths = np.zeros((0, 2), np.int64)
+        ours = self.proof(none["nodes"], none["cuts"], none["planes"], none["choices"], none["pieces"], lengths)
+        return replace(former, **none).to_bytes() == ours.to_bytes()
+
+    def lengths(self, former: PairMap) -> Array:
+        """Returns how many nodes of pieces, and how many pieces, each plane of a map of this tree has, (P, 2)."""
+        vertices = np.array([sum(len(volume.vertices) for volume in chosen) for chosen in former.chosen])
+        return lengths_of(former.pieces, vertices[former.choices])
 
     def advance(self, given: OpenCells, samples: Array, weights: Array, most: int, water: float) -> Found:
         """Works on open cells until ``most`` were looked at, or none has samples of more weight than ``water``.

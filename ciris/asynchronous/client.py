@@ -269,6 +269,18 @@ class AsyncClient:
         """Returns the results of a cover."""
         return await self._json("GET", f"/v1/jobs/{segment(job_id)}/cover")
 
+    async def map(self, job_id: str) -> Document:
+        """Returns how far a map is, and what is stored of it."""
+        return await self._json("GET", f"/v1/jobs/{segment(job_id)}/map")
+
+    async def map_proof(self, job_id: str) -> bytes:
+        """Returns the proof of the map that a job has grown."""
+        return (await self._send("GET", f"/v1/jobs/{segment(job_id)}/map/proof")).content
+
+    async def free_set(self, job_id: str) -> bytes:
+        """Returns the free set of the map that a job has grown, as a file."""
+        return (await self._send("GET", f"/v1/jobs/{segment(job_id)}/map/free-set")).content
+
     async def motion(self, job_id: str) -> Document:
         """Returns what has become of the motion that a job has certified."""
         return await self._json("GET", f"/v1/jobs/{segment(job_id)}/motion")

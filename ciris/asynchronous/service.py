@@ -20,6 +20,7 @@ from ciris.answers import (
     Coverage,
     Event,
     Graph,
+    Map,
     Motion,
     Near,
     Nearest,
@@ -30,8 +31,21 @@ from ciris.answers import (
 )
 from ciris.asynchronous.client import AsyncClient
 from ciris.documents import Document, document, given, named
+from ciris.free_set import FreeSet
 from ciris.job import JobData, why_no_region
-from ciris.options import CERTIFY, COVER, JOB, RECERTIFY, CertifyOptions, CoverOptions, GrowOptions, JobOptions, RecertifyOptions
+from ciris.options import (
+    CERTIFY,
+    COVER,
+    JOB,
+    MAP,
+    RECERTIFY,
+    CertifyOptions,
+    CoverOptions,
+    GrowOptions,
+    JobOptions,
+    MapOptions,
+    RecertifyOptions,
+)
 from ciris.reading import read
 from ciris.region import RegionData, region_fields
 from ciris.requests import FramePose, Tolerance, asked_for, grow_request, motion_request, plain, points, straight
@@ -214,6 +228,56 @@ class AsyncService:
         """Creates a job that covers a scene, and returns it at once. Its regions are there as soon as each is certified."""
         request = {"kind": "cover", "scene": scene_name(scene), **asked_for(options, COVER)}
         return self._job((await self.client.create_job(request))[0])
+
+    async def map(self, scene: str | Scene, *, former: str | AsyncJob | None = None, **options: Unpack[MapOptions]) -> Map:
+        """Proves as much as possible of the free configurations of a scene, and waits for it. The job goes on if the wait is interrupted.
+
+        Args:
+            former: a job that has grown a map. What it proves of the same bodies is taken over.
+
+        Raises:
+            CirisError: what was refused, or what went wrong.
+        """
+        return await self.map_of(await (await self.submit_map(scene, former=former, **options)).wait())
+
+    async def submit_map(self, scene: str | Scene, *, former: str | AsyncJob | None = None, **options: Unpack[MapOptions]) -> AsyncJob:
+        """Creates a job that grows the map of a scene, and returns it at once.
+
+        Args:
+            former: as for :meth:`map`.
+        """
+        before = former if former is None or isinstance(former, str) else former.id
+        request = {"kind": "map", "scene": scene_name(scene), **asked_for(options, MAP), **given(former=before)}
+        return self._job((await self.client.create_job(request))[0])
+
+    async def map_of(self, job: str | AsyncJob) -> Map:
+        """Returns how far the map of a job is.
+
+        Raises:
+            CirisError: map_not_found, for a job of another kind; what went wrong, for one that has failed without a map.
+        """
+        found = await self.job(job) if isinstance(job, str) else job
+        told = read(Map, await self.client.map(found.id))
+        if told.stored is None and found.error:
+            raise CirisError.from_document(found.error)
+        return told
+
+    async def map_proof(self, job: str | AsyncJob) -> bytes:
+        """Returns the proof file of the map of a job, which ``ciris verify`` checks on any machine.
+
+        Raises:
+            CirisError: map_not_found.
+        """
+        return await self.client.map_proof(job if isinstance(job, str) else job.id)
+
+    async def free_set(self, job: str | AsyncJob) -> FreeSet:
+        """Returns the free set of the map of a job. It answers without the service. It needs numba: pip install 'ciris[monitor]'.
+
+        Raises:
+            CirisError: map_not_found; proof_not_found, where no configuration is proved to be free; as FreeSet.load.
+        """
+        name = job if isinstance(job, str) else job.id
+        return FreeSet.of_bytes(await self.client.free_set(name), f"the free set of the job {name}")
 
     async def recertify(self, region: str | AsyncRegion, scene: str | Scene, **options: Unpack[RecertifyOptions]) -> AsyncRegion:
         """Makes a region of a changed scene from one of the scene before, and waits for it.

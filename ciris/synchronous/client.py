@@ -268,6 +268,18 @@ class Client:
         """Returns the results of a cover."""
         return self._json("GET", f"/v1/jobs/{segment(job_id)}/cover")
 
+    def map(self, job_id: str) -> Document:
+        """Returns how far a map is, and what is stored of it."""
+        return self._json("GET", f"/v1/jobs/{segment(job_id)}/map")
+
+    def map_proof(self, job_id: str) -> bytes:
+        """Returns the proof of the map that a job has grown."""
+        return self._send("GET", f"/v1/jobs/{segment(job_id)}/map/proof").content
+
+    def free_set(self, job_id: str) -> bytes:
+        """Returns the free set of the map that a job has grown, as a file."""
+        return self._send("GET", f"/v1/jobs/{segment(job_id)}/map/free-set").content
+
     def motion(self, job_id: str) -> Document:
         """Returns what has become of the motion that a job has certified."""
         return self._json("GET", f"/v1/jobs/{segment(job_id)}/motion")

@@ -29,6 +29,12 @@ def add(verbs: Any) -> None:
             of_one.add_argument("--watch", action="store_true", help=WATCH)
         of_one.set_defaults(run=f"client.jobs:job_{verb}")
 
+    mapped = job.add_parser("map", parents=[remote(), as_json()], help="write the map that a job has grown")
+    mapped.add_argument("job", metavar="ID", help=OF_ONE)
+    mapped.add_argument("--out", metavar="FILE", help="new file for the map; default: one in this directory, named after scene and map")
+    mapped.add_argument("--free-set", metavar="FILE", help="new file for the map's free set; default: none")
+    mapped.set_defaults(run="client.map:of_job")
+
     told = job.add_parser("webhook", parents=[remote(), as_json()], help="show the calls to a job's webhook and their results")
     told.add_argument("job", metavar="ID", help=OF_ONE)
     told.add_argument("--resend", action="store_true", help="call the webhook again")

@@ -56,13 +56,18 @@ def add(verbs: Any) -> None:
 
     mapped = verbs.add_parser(
         "map",
-        parents=[as_json()],
+        parents=[remote(), as_json()],
         help="prove as much as possible of the free configurations, cell by cell",
-        epilog="Example: ciris map examples/iiwa_shelf/scene.yaml --local --coverage 0.8 --deadline 60. "
+        epilog="Example: ciris map examples/iiwa_shelf/scene.yaml --coverage 0.8 --deadline 60. "
         "The exit status is 0 if the coverage is reached.",
     )
-    mapped.add_argument("scene", metavar="SCENE", help="path of a scene file")
+    mapped.add_argument("scene", metavar="SCENE", help=SCENE)
     add_options(mapped, MAP)
+    mapped.add_argument(
+        "--former",
+        metavar="MAP",
+        help="take over what this map proves of the same bodies, such as the robot's own: the id of a job; with --local, a proof file",
+    )
     mapped.add_argument("--out", metavar="FILE", help="new file for the map; default: one in this directory, named after scene and map")
     mapped.add_argument("--local", action="store_true", help="grow the map in this process, without a service")
     mapped.set_defaults(run="client.map:grow")

@@ -41,9 +41,9 @@ def test_every_wrong_field_is_listed(client: TestClient) -> None:
     ("method", "path", "body", "field", "said"),
     [
         ("GET", "/v1/jobs?label=red", None, "label[0]", "it must be a label, NAME=VALUE"),
-        ("POST", "/v1/jobs", {"scene": "slider"}, "kind", "it must be one of grow, certify, recertify, certify-path, cover"),
-        ("POST", "/v1/jobs", {"kind": "dance"}, "kind", "it must be one of grow, certify, recertify, certify-path, cover"),
-        ("POST", "/v1/jobs/batch", {"jobs": [{}]}, "jobs[0].kind", "it must be one of grow, certify, recertify, certify-path, cover"),
+        ("POST", "/v1/jobs", {"scene": "slider"}, "kind", "it must be one of grow, certify, recertify, certify-path, cover, map"),
+        ("POST", "/v1/jobs", {"kind": "dance"}, "kind", "it must be one of grow, certify, recertify, certify-path, cover, map"),
+        ("POST", "/v1/jobs/batch", {"jobs": [{}]}, "jobs[0].kind", "it must be one of grow, certify, recertify, certify-path, cover, map"),
     ],
 )
 def test_what_is_wrong_is_said_in_words(client: TestClient, method: str, path: str, body: Any, field: str, said: str) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from certifier.options import Option, Takes
-from client.options import CERTIFY, COVER, GROW, JOB, RECERTIFY, Part
+from client.options import CERTIFY, COVER, GROW, JOB, MAP, RECERTIFY, Part
 from tests.ciris.twin import ROOT, formatted
 
 MODULE = ROOT / "ciris" / "options.py"
@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 
 Fields: TypeAlias = "Mapping[str, tuple[str, str | Fields]]"
 '''
-KINDS = {"job": JOB, "grow": GROW, "cover": COVER, "certify": CERTIFY, "recertify": RECERTIFY}
+KINDS = {"job": JOB, "grow": GROW, "cover": COVER, "map": MAP, "certify": CERTIFY, "recertify": RECERTIFY}
 TYPES = {
     Takes.WHOLE: "int",
     Takes.REAL: "float",

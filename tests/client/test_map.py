@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from client import map
 from client.output import Screen
 from tests.client.conftest import PLANAR, Ciris
 
@@ -46,9 +47,29 @@ def test_what_is_proved_stays_when_somebody_interrupts(ciris: Ciris, monkeypatch
     assert ciris("verify", "planar.proof").status == 0
 
 
+def test_a_former_map_is_gone_on_with(ciris: Ciris, tmp_path: Path) -> None:
+    ciris("map", PLANAR, "--local", "--coverage", "0.8", "--out", "first.proof")
+    again = ciris("map", PLANAR, "--local", "--coverage", "0.8", "--former", "first.proof", "--json")
+    assert (again.status, again.json["ended"]) == (0, "coverage")
+    assert ciris("verify", again.json["proof"]).status == 0
+    (tmp_path / "text.proof").write_text("no proof")
+    for path, words in (("text.proof", "text.proof: the proof file is malformed"), ("missing.proof", "missing.proof")):
+        done = ciris("map", PLANAR, "--local", "--former", path)
+        assert (done.status, words in done.error) == (2, True), done.error
+
+
+def test_a_former_map_that_changes_meanwhile_is_refused(ciris: Ciris, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The error is a ``proof_malformed``."""
+    ciris("map", PLANAR, "--local", "--coverage", "0.5", "--out", "first.proof")
+    with monkeypatch.context() as patched:
+        patched.setattr(map, "in_child", lambda *_: {"sha256": "of what was checked"})
+        done = ciris("map", PLANAR, "--local", "--former", "first.proof")
+    assert done.status == 2
+    assert done.error.startswith("first.proof: it has changed since it was checked")
+
+
 def test_bad_input_is_named(ciris: Ciris, tmp_path: Path) -> None:
     for arguments, words in (
-        ((PLANAR,), "--local"),
         (("missing.yaml", "--local"), "missing.yaml"),
         ((PLANAR, "--local", "--coverage", "1.5"), "--coverage"),
         ((PLANAR, "--local", "--at", "0"), "--at"),

@@ -7,9 +7,11 @@ import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
+import httpx2
 import numpy as np
 import pytest
 
+import ciris
 from tests.client.conftest import PLANAR, Done, command, surroundings
 
 
@@ -18,6 +20,7 @@ class Machine:
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
+        self.url = ""
         self.environment = surroundings(CIRIS_DATA_DIR=str(directory / "data"), CIRIS_SOLVE_PROCESSES="1")
 
     def up(self) -> subprocess.Popen[str]:
@@ -40,7 +43,9 @@ def machine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
     machine = Machine(tmp_path_factory.mktemp("machine"))
     stack = machine.up()
     assert stack.stdout is not None
-    assert "ciris is up at http://127.0.0.1:" in stack.stdout.readline()
+    said = stack.stdout.readline()
+    assert "ciris is up at http://127.0.0.1:" in said
+    machine.url = said.split(" at ")[1].split()[0].rstrip(".,:")
     yield machine
     stack.send_signal(signal.SIGINT)
     stack.communicate(timeout=30)
@@ -95,3 +100,38 @@ def test_bad_input_fails_the_job_with_a_reason_and_nothing_else(machine: Machine
     assert done.status == 2
     assert "arm/lower/bar and obstacles/body/post overlap" in done.stderr.splitlines()[-1]
     assert machine.ciris("doctor").status == 0
+
+
+def test_a_map_of_the_service_is_that_of_this_machine_and_answers_questions(machine: Machine) -> None:
+    asked = ("map", PLANAR, "--coverage", "0.9", "--at", "0.2,-0.4", "--json")
+    done, here = machine.ciris(*asked, "--out", "service.proof"), machine.ciris(*asked, "--local", "--out", "local.proof")
+    assert done.status == 0, done.stderr
+    assert (here.status, here.json["ended"]) == (0, "coverage")
+    same = ("outcome", "coverage", "cells", "looked_at", "ended", "given_up", "at")
+    assert [done.json[name] for name in same] == [here.json[name] for name in same]
+    assert (machine.directory / "service.proof").read_bytes() == (machine.directory / "local.proof").read_bytes()
+    assert machine.ciris("verify", "service.proof").status == 0
+    job = done.json["job"]
+    again = machine.ciris("job", "map", job[:8], "--out", "again.proof", "--free-set", "again.npz", "--json")
+    assert (again.status, again.json["coverage"], again.json["proof"]) == (0, done.json["coverage"], "again.proof")
+    assert (machine.directory / "again.proof").read_bytes() == (machine.directory / "local.proof").read_bytes()
+    assert ciris.FreeSet.load(machine.directory / "again.npz").contains([0.2, -0.4])
+    inside = machine.ciris("contains", "planar-2dof", "--q", "0.2,-0.4")
+    assert (inside.status, inside.stdout) == (0, f"inside: 0.2, -0.4 in map of job {job}\n")
+    path = machine.ciris("path", "planar-2dof", "--q", "0.2,-0.4", "--q", "0.201,-0.401")
+    assert path.status == 0
+    assert f"map of job {job}" in path.stdout
+    with ciris.connect(machine.url) as service:
+        found = service.map_of(job)
+        assert found
+        assert found.stored is not None
+        assert (found.cells, found.stored.at[0].state) == (done.json["cells"], "proved")
+        free = service.free_set(service.job(job))
+        assert free.contains([0.2, -0.4])
+        assert service.map_proof(job) == (machine.directory / "local.proof").read_bytes()
+        assert service.contains("planar-2dof", [0.2, -0.4])[0].map
+        early = service.map("planar-2dof", former=service.job(job), coverage=1.0)
+        assert (bool(early), early.ended) == (False, "nothing_left")
+    page = httpx2.get(f"{machine.url}/jobs/{job}").text
+    for words in ("Proved over time", "of the free configurations", "Configurations wanted first", f"/v1/jobs/{job}/map/free-set"):
+        assert words in page

@@ -109,6 +109,17 @@ def test_configurations_are_marked_to_be_connected(opened: Any, url: str, client
     assert job["options"]["coverage"] is None
 
 
+def test_a_map_is_asked_for(opened: Any, url: str, client: TestClient) -> None:
+    opened.get_by_text("Map the scene").click()
+    opened.get_by_label("Coverage").fill("0.7")
+    opened.get_by_role("button", name="Add this configuration").click()
+    opened.get_by_role("button", name="Start the job").click()
+    opened.wait_for_url(f"{url}/jobs/*")
+    (job,) = jobs(client)
+    assert job["kind"] == "map"
+    assert job["options"] == {"coverage": 0.7, "at": [pytest.approx([0.1, -0.2])], "random_seed": 0, "former": None}
+
+
 def test_what_the_service_refuses_is_said_and_nothing_is_lost(opened: Any, client: TestClient, complaints: list[str]) -> None:
     opened.route(
         "**/v1/jobs",

@@ -63,7 +63,6 @@ COMMANDS: Table = {
     ("option_value", "--deadline"): [lambda t: grow(t, "--deadline", "0"), lambda t: again(t, "x", "--deadline", "0")],
     ("option", "--deadline"): [lambda t: good(t, "--local", "--deadline", "9")],
     ("several_seeds", "--q"): [lambda t: grow(t, "--q", "0,0", "--q", "0,1")],
-    ("option", "--local"): [lambda t: t.ciris("map", PLANAR)],
     ("seed_wrong_length", "--at[0]"): [lambda t: t.ciris("map", PLANAR, "--local", "--at", "0")],
     ("option", "--priority"): [lambda t: grow(t, "--local", "--priority", "1")],
     ("option", "--solver"): [lambda t: good(t, "--solver", "clarabel")],

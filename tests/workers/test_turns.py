@@ -379,7 +379,7 @@ def test_a_region_whose_proof_is_refused_is_never_stored(job_id: str) -> None:
     work_all()
     coordinate(job_id)
     job = job_of(job_id)
-    assert (job.state, job.region_id, job.reason) == ("failed", None, "the proof of a region was refused")
+    assert (job.state, job.region_id, job.reason) == ("failed", None, "the verifier refused the proof")
     assert (job.error or {})["code"] == "proof_malformed"
     with database().read() as session:
         assert not regions.page(session).rows
@@ -578,7 +578,7 @@ def test_a_region_is_had_from_an_earlier_polytope_when_the_proof_of_the_last_is_
     work_all()
     coordinate(job_id)
     job = job_of(job_id)
-    assert (job.state, job.reason) == ("failed", "the proof of a region was refused")
+    assert (job.state, job.reason) == ("failed", "the verifier refused the proof")
     with database().read() as session:
         assert regions.get(session, job.region_id or "").iteration == 0
 

@@ -1,5 +1,5 @@
-// What is known of one configuration: what touches there, which regions and motions hold it, and which region is nearest. An answer
-// counts for the configuration that it was asked for, and for no other.
+// What is known of one configuration: what touches there, which regions, motions and map prove it, and which region is nearest. An
+// answer counts for the configuration that it was asked for, and for no other.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { post, said } from "./api";
 import type { ContactsResponse, ContainsResponse, Near, NearestResponse, SceneModel } from "./schema";
@@ -12,12 +12,14 @@ export interface Moment {
   regions: string[];
   /** The proved motions whose tubes hold it. */
   motions: string[];
+  /** The job whose map proves it; null where none does. */
+  map: string | null;
   nearest: Near | null;
   problem: string | null;
 }
 
 const AGAIN_MS = 2000;
-const NOTHING: Moment = { outside: [], regions: [], motions: [], nearest: null, problem: null };
+const NOTHING: Moment = { outside: [], regions: [], motions: [], map: null, nearest: null, problem: null };
 
 async function ask(scene: string, q: number[]): Promise<Moment> {
   const body = { scene, q: [q] };
@@ -26,13 +28,13 @@ async function ask(scene: string, q: number[]): Promise<Moment> {
     post<ContainsResponse>("/v1/planning/contains", body),
   ]);
   const { pairs, outside } = touching.contacts[0]!;
-  const { inside, motions } = containing.points[0]!;
+  const { inside, motions, map } = containing.points[0]!;
   const regions = containing.points[0]!.regions.map(({ region }) => region);
   let nearest: Moment["nearest"] = null;
   if (!inside && containing.regions > 0 && outside.length === 0) {
     nearest = (await post<NearestResponse>("/v1/planning/nearest", body)).points[0]!.nearest;
   }
-  return { pairs, outside, regions, motions, nearest, problem: null };
+  return { pairs, outside, regions, motions, map: map ? containing.map : null, nearest, problem: null };
 }
 
 /** Asks about one configuration at a time, then about the latest; where the service does not answer, again. */
@@ -78,7 +80,7 @@ export function touchingOf(model: SceneModel, moment: Moment): number[] {
 
 /** Says in words what is known of the configuration, and how surely. */
 export function MomentText({ model, moment }: { model: SceneModel; moment: Moment }) {
-  const { pairs, outside, regions, motions, nearest, problem } = moment;
+  const { pairs, outside, regions, motions, map, nearest, problem } = moment;
   const names = (pairs ?? []).map((pair) => model.pairs[pair]!.map((i) => model.geometries[i]!.name).join(" and "));
   return (
     <p class="said" role="status">
@@ -90,6 +92,8 @@ export function MomentText({ model, moment }: { model: SceneModel; moment: Momen
         <span class="good">In {regions.length === 1 ? "a certified region" : `${regions.length} certified regions`}: {regions.slice(0, 4).map((region, i) => <>{i > 0 && ", "}<a href={`/regions/${region}`} key={region}>{region.slice(0, 8)}</a></>)}. No collision of the scene's pairs, as proved.</span>
       ) : motions.length ? (
         <span class="good">In the tube of the proved motion {motions[0]!.slice(0, 8)}. No collision of the scene's pairs, as proved.</span>
+      ) : map ? (
+        <span class="good">In proved cells of the <a href={`/jobs/${map}`}>map</a>. No collision of the scene's pairs, as proved.</span>
       ) : (
         <span>Free here, by floating point, and in no certified region{nearest && <>; the nearest is <a href={`/regions/${nearest.region}`}>{nearest.region.slice(0, 8)}</a>, {nearest.distance.toPrecision(3)} away in s</>}.</span>
       )}

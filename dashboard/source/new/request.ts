@@ -1,6 +1,6 @@
 // What somebody wishes for in the form, and the request that asks for it.
 
-export type Kind = "grow" | "cover";
+export type Kind = "grow" | "cover" | "map";
 
 /** An option as the service describes it (api/pages/form.py). A group has options of its own. */
 export interface Option {
@@ -33,7 +33,7 @@ export interface Wish {
   given: Given;
   minutes: string;
   priority: string;
-  /** More configurations: to contain, to begin with, or to connect. */
+  /** More configurations: to contain, to begin with, to connect, or to prove first. */
   marks: number[][];
 }
 
@@ -44,8 +44,8 @@ export function request(scene: string, q: number[], wish: Wish, parts: Parts): R
   const { kind, goal, marks } = wish;
   const common = { kind, scene, ...(wish.minutes.trim() && { deadline_seconds: Number((60 * Number(wish.minutes)).toPrecision(12)) }), ...(wish.priority !== "0" && { priority: Number(wish.priority) }) };
   const { seed, options } = Object.fromEntries(parts[kind].map((part) => [part.place, values(part.options, part.place, wish.given)]));
-  const named = marks.length > 0 && { [kind === "grow" ? "contain" : goal === "connect" ? "connect" : "seeds"]: marks };
-  if (kind === "cover") return { ...common, options: { ...named, ...options } };
+  const named = marks.length > 0 && { [kind === "grow" ? "contain" : kind === "map" ? "at" : goal === "connect" ? "connect" : "seeds"]: marks };
+  if (kind !== "grow") return { ...common, options: { ...named, ...options } };
   return { ...common, seed: { q, ...named, ...seed }, ...(Object.keys(options!).length && { options }) };
 }
 

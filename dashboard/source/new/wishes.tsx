@@ -18,13 +18,14 @@ const MARKS = {
   grow: ["The region must also contain", "such as where it shall meet another region"],
   coverage: ["Regions begin at", "before the service chooses where to begin"],
   connect: ["Connect these configurations", "each gets a region; all of them shall end in one component"],
+  map: ["Prove these configurations first", "before the samples decide where to work"],
 } as const;
 
 export function Wishes({ wish, parts, refused, onWish, marks, onMark, onGo }: Props) {
   const set = (part: Partial<Wish>): void => onWish({ ...wish, ...part });
-  const [title, why] = MARKS[wish.kind === "grow" ? "grow" : wish.goal];
+  const [title, why] = MARKS[wish.kind === "cover" ? wish.goal : wish.kind];
   const shared = { given: wish.given, onGive: (path: string, value: string) => set({ given: { ...wish.given, [path]: value } }), refused };
-  const goal = (name: string): boolean => wish.kind === "cover" && wish.goal === "coverage" && name === "coverage";
+  const goal = (name: string): boolean => (wish.kind === "map" || (wish.kind === "cover" && wish.goal === "coverage")) && name === "coverage";
   return (
     <>
       <fieldset class="kinds">
@@ -36,6 +37,10 @@ export function Wishes({ wish, parts, refused, onWish, marks, onMark, onGo }: Pr
         <label class="card">
           <input type="radio" name="kind" checked={wish.kind === "cover"} onChange={() => set({ kind: "cover" })} />
           <span><strong>Cover the scene</strong> with regions, one after another, until a share of it is covered or configurations are connected.</span>
+        </label>
+        <label class="card">
+          <input type="radio" name="kind" checked={wish.kind === "map"} onChange={() => set({ kind: "map" })} />
+          <span><strong>Map the scene</strong>: prove as much as possible of the free configurations, cell by cell, without a seed.</span>
         </label>
       </fieldset>
       {wish.kind === "cover" && (
@@ -76,7 +81,7 @@ export function Wishes({ wish, parts, refused, onWish, marks, onMark, onGo }: Pr
         <p class="field">
           <label for="new-minutes">Deadline</label>
           <input id="new-minutes" type="number" min={0.01} max={43200} step="any" placeholder="none" value={wish.minutes} onInput={(event) => set({ minutes: event.currentTarget.value })} />
-          <span class="quiet">minutes; the regions so far are kept</span>
+          <span class="quiet">minutes; what is proved until then is kept</span>
         </p>
         <p class="field">
           <label for="new-priority">Priority</label>

@@ -10,7 +10,8 @@ import pytest
 
 from certifier.jobs.map import _adopted, grow_map
 from certifier.map.growing import Growing
-from certifier.model import WORLD, JointKind
+from certifier.map.trees import Plan
+from certifier.model import WORLD, Joint, JointKind, Pair
 from certifier.pair.collisions import in_collision
 from certifier.proof import limits
 from certifier.proof.map import MapProof, PairMap
@@ -95,6 +96,65 @@ def test_its_file_is_read_again_and_holds(grown):
 def test_the_same_effort_gives_the_same_map_whatever_the_processes(grown):
     scene, found = grown
     assert grow_map(scene, 0.95, processes=2).proof.to_bytes() == found.proof.to_bytes()
+
+
+def test_a_former_map_of_the_same_scene_is_gone_on_with(grown):
+    scene, found = grown
+    again = Growing(scene, np.zeros((0, scene.n)), former=MapProof.from_bytes(found.proof.to_bytes()))
+    assert again.coverage == found.coverage
+    assert again.planes == found.cells
+    more = grow_map(scene, min(1.0, found.coverage.share + 0.01), deadline_s=20, former=found.proof)
+    assert more.coverage.share >= found.coverage.share
+    statement = verify_map(more.proof.to_bytes())
+    assert statement.cells == more.cells >= found.cells
+    samples = samples_of(scene)
+    proved = inside(scene, more.proof, samples)
+    assert (proved >= inside(scene, found.proof, samples)).all()
+    assert not (in_collision(scene, samples) & proved).any()
+
+
+def test_a_new_obstacle_opens_its_own_pairs_alone():
+    before, post = planar_arm(3, CROWDED), box("post/box", "post", (0.1, 0.1, 0.3), (-0.9, 1.4, 0.0))
+    weld = Joint("post", JointKind.WELD, WORLD, "post", np.zeros(3), np.eye(4), np.eye(4))
+    after = replace(
+        before,
+        joints=(*before.joints, weld),
+        bodies=(*before.bodies, "post"),
+        geometries=(*before.geometries, post),
+        pairs=(*before.pairs, *(Pair(geometry.name, post.name) for geometry in before.geometries[:-1])),
+    )
+    first = grow_map(before, 0.95)
+    anew, taken = grow_map(after, 0.93), grow_map(after, 0.93, former=first.proof)
+    assert taken.looked < 0.8 * anew.looked
+    samples = samples_of(after)
+    assert not (in_collision(after, samples) & inside(after, taken.proof, samples)).any()
+    assert verify_map(taken.proof.to_bytes()).missing == 0
+    known = {part.scene.hash: part for part in first.proof.maps}
+    for pairs, part in zip(taken.proof.pairs, taken.proof.maps, strict=True):
+        if all(post.name not in (pair.a, pair.b) for pair in pairs):
+            old = known[part.scene.hash]
+            s = samples[:, sub_scene(after, pairs).positions]
+            assert (in_planes(part, s) >= in_planes(old, s)).all()
+
+
+def test_a_former_map_with_another_padding_is_of_no_use():
+    scene = planar_arm(2, CROWDED)
+    other = grow_map(replace(scene, padding=0.02), 0.9)
+    assert grow_map(scene, 0.9, former=other.proof).proof.to_bytes() == grow_map(scene, 0.9).proof.to_bytes()
+
+
+@pytest.mark.parametrize("ignored", range(4))
+def test_a_pair_that_is_ignored_leaves_the_others_of_its_bodies(ignored):
+    """The geometries of a rigid part are looked at together, and then apart."""
+    one = planar_arm(2, CROWDED)
+    other = box("world/other", WORLD, (0.2, 0.2, 0.3), (-0.9, -1.2, 0.0))
+    pairs = [pair for obstacle in (CROWDED, other) for pair in (Pair(bar.name, obstacle.name) for bar in one.geometries[:-1])]
+    scene = replace(one, geometries=(*one.geometries, other), pairs=tuple(pairs[:ignored] + pairs[ignored + 1 :]))
+    samples = samples_of(scene, 2000)
+    free, collides = Plan(scene).free(samples), in_collision(scene, samples)
+    assert not (free & collides).any()
+    assert (free | collides).mean() > 0.999
+    assert grow_map(scene, 0.9, deadline_s=20).reason == "coverage"
 
 
 def test_bodies_that_always_touch_have_no_cells():
