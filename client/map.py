@@ -41,6 +41,10 @@ ENDS = {
 """Why a map ended, in words."""
 
 
+NO_SAMPLE = 1.0
+"""The standard error of a coverage that no sample tells anything about."""
+
+
 def grow(args: Namespace) -> int:
     """Grows a map, here or by the service, and returns the command's exit status.
 
@@ -183,4 +187,6 @@ def _wanted(scene: Scene, given: Given, field: str) -> list[float]:
 
 
 def _said(share: float, error: float, cells: int) -> str:
+    if error == NO_SAMPLE:
+        return f"no configuration was found that is free of collision, {cells} cells"
     return f"{100 * share:.1f} % of the free configurations proved (standard error {100 * error:.1f} %), {cells} cells"

@@ -68,6 +68,22 @@ def test_a_former_map_that_changes_meanwhile_is_refused(ciris: Ciris, monkeypatc
     assert done.error.startswith("first.proof: it has changed since it was checked")
 
 
+def test_a_scene_in_which_bodies_always_touch_says_so(ciris: Ciris, tmp_path: Path) -> None:
+    model = "<link name='{0}'><collision name='{0}'><geometry><box><size>1 1 1</size></box></geometry></collision></link>"
+    joint = "<joint name='turn' type='revolute'><parent>one</parent><child>two</child><axis><xyz>0 0 1</xyz><limit><lower>-1</lower>"
+    joint += "<upper>1</upper></limit></axis></joint>"
+    parts = "".join(model.format(name) for name in ("one", "two", "three"))
+    weld = "<joint name='weld' type='fixed'><parent>two</parent><child>three</child></joint>"
+    (tmp_path / "model.sdf").write_text(f"<sdf version='1.7'><model name='m'>{parts}{joint}{weld}</model></sdf>")
+    (tmp_path / "scene.yaml").write_text(
+        "name: touching\ndirectives:\n  - add_model: {name: m, file: model.sdf}\n  - add_weld: {parent: world, child: m::one}\n"
+    )
+    done = ciris("map", "scene.yaml", "--local", "--at", "0")
+    assert done.status == 1, done.error
+    assert "no configuration was found that is free of collision, 0 cells" in done.stdout
+    assert "q = 0: in collision" in done.stdout
+
+
 def test_bad_input_is_named(ciris: Ciris, tmp_path: Path) -> None:
     for arguments, words in (
         (("missing.yaml", "--local"), "missing.yaml"),

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from certifier.jobs.map import _adopted, grow_map
+from certifier.jobs.map import _adopted, grow_map, grow_round
 from certifier.map.growing import Growing
 from certifier.map.trees import Plan
 from certifier.model import WORLD, Joint, JointKind, Pair
@@ -171,6 +171,15 @@ def grown_until(growing, enough):
             tree = growing.trees[task.pairs].pair
             growing.take(task, tree.advance(task.given, task.samples, task.weights, task.most, task.water))
     return growing.looked
+
+
+def test_a_map_that_has_ended_does_not_grow_on():
+    """So a process that goes on with the map of another one, which died before it said that the map has ended, ends it there too."""
+    growing = Growing(planar_arm(2, CROWDED), np.zeros((0, 2)))
+    looked = grown_until(growing, lambda growing: growing.coverage.share >= 0.9)
+    assert grow_round(growing, lambda _: [], 0.9, lambda: None) == "coverage"
+    assert grow_round(growing, lambda _: [], 1.0, lambda: "deadline") == "deadline"
+    assert growing.looked == looked
 
 
 def test_wanted_configurations_come_first():
