@@ -90,7 +90,7 @@ def add(verbs: Any) -> None:
     add_options(plan, JOB)
     plan.set_defaults(run="client.planning:plan")
 
-    path = verbs.add_parser("path", parents=[remote(), as_json()], help="decide whether every point of a path is in certified regions")
+    path = verbs.add_parser("path", parents=[remote(), as_json()], help="decide whether every point of a path is proved to be free")
     path.add_argument("scene", metavar="SCENE", help=SCENE)
     _add_curve(path, "q")
     path.set_defaults(run="client.planning:path")

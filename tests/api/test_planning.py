@@ -37,7 +37,7 @@ def test_contains_says_which_region_holds_a_point_and_how_deep(client: TestClien
 def test_contains_without_any_region_is_no(client: TestClient, scene) -> None:
     answer = client.post("/v1/planning/contains", json={"scene": "slider", "q": [[0.1]]}).json()
     assert {name: answer[name] for name in ("scene", "version", "regions")} == {"scene": scene.hash[:16], "version": 0, "regions": 0}
-    assert answer["points"] == [{"inside": False, "regions": [], "margin": None, "motions": []}]
+    assert answer["points"] == [{"inside": False, "regions": [], "margin": None, "motions": [], "map": None}]
 
 
 @pytest.mark.parametrize(
@@ -64,7 +64,7 @@ def test_nearest_names_the_nearest_region_and_its_nearest_point(client: TestClie
 def test_a_segment_is_covered_or_it_is_said_where_it_is_not(client: TestClient, region: str, space: str) -> None:
     body = {"scene": "slider", "q": [[[-0.2], [0.15]], [[0.0], [0.4]], [[0.5], [0.6]]], "space": space}
     inside, leaving, outside = client.post("/v1/planning/segment", json=body).json()["segments"]
-    piece = {"begin": 0.0, "end": 1.0, "region": region, "motion": None, "guarantee": "exact"}
+    piece = {"begin": 0.0, "end": 1.0, "region": region, "motion": None, "map": None, "guarantee": "exact"}
     assert inside == {"covered": True, "pieces": [piece], "uncovered": None}
     assert (leaving["covered"], leaving["pieces"][0]["end"]) == (False, pytest.approx(0.5))
     assert leaving["uncovered"] | {"next": None} == {

@@ -41,7 +41,7 @@ def test_a_path_is_answered_by_the_exit_status(ciris: Ciris, url: str, region: s
     assert header.split() == ["from", "to", "proved", "by", "guarantee"]
     assert (first.split()[0], second.split()[1]) == ("0", "2")
     assert [first.split()[2:4], second.split()[2:4]] == [["region", region], ["region", more]]
-    assert verdict == "covered: every point of the path is in certified regions, 2 of 2"
+    assert verdict == "covered: every point of the path is proved to be free of collision"
     beyond = ciris("path", "slider", "--q", "-0.4", "--q", "0.1", "--space", "s", CIRIS_URL=url)
     assert beyond.status == 1
     assert beyond.stdout.splitlines() == [

@@ -578,7 +578,7 @@ def test_a_region_is_had_from_an_earlier_polytope_when_the_proof_of_the_last_is_
     work_all()
     coordinate(job_id)
     job = job_of(job_id)
-    assert (job.state, job.reason) == ("failed", "the verifier refused the proof")
+    assert (job.state, job.reason) == ("failed", "the proof could not be stored")
     with database().read() as session:
         assert regions.get(session, job.region_id or "").iteration == 0
 
