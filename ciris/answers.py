@@ -489,18 +489,6 @@ class Event:
 
 
 @dataclass(frozen=True)
-class FreeCoverage:
-    """How much of the collision-free configurations is in regions. It is estimated from samples, and proves nothing."""
-
-    value: float
-    stderr: float
-    samples: int
-
-    def __float__(self) -> float:
-        return self.value
-
-
-@dataclass(frozen=True)
 class MapCoverage:
     """How much of the collision-free configurations a map proves. It is estimated from samples, and proves nothing."""
 
@@ -509,6 +497,13 @@ class MapCoverage:
 
     def __float__(self) -> float:
         return self.value
+
+
+@dataclass(frozen=True)
+class FreeCoverage(MapCoverage):
+    """How much of the collision-free configurations is in regions. It is estimated from samples, and proves nothing."""
+
+    samples: int
 
 
 @dataclass(frozen=True)

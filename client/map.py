@@ -7,8 +7,6 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from certifier.errors import CirisError, RegionError
 from certifier.map.options import MapOptions
 from certifier.model import Scene
@@ -39,8 +37,6 @@ ENDS = {
     "worker_lost": "a process died; look whether the machine ran out of memory: fewer cores need less of it",
 }
 """Why a map ended, in words."""
-
-
 NO_SAMPLE = 1.0
 """The standard error of a coverage that no sample tells anything about."""
 
@@ -70,15 +66,16 @@ def _here(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
     scene = load(args.scene)
     wanted = [_wanted(scene, q, f"options.at[{i}]") for i, q in enumerate(asked["options"].pop("at", []))]
     options = read(MapOptions, asked["options"], "options")
-    at = scene.to_s(scene.in_windows(np.array(wanted).reshape(-1, scene.n)))
-    from certifier.jobs.map import grow_map
+    from certifier.jobs.map import grow_map, in_s
 
     former = None if args.former is None else _former(args.former)
 
     def tell(_: str, told: dict[str, Any]) -> None:
         screen.status(_said(told["coverage"], told["error"], told["cells"]), told["coverage"])
 
-    found = grow_map(scene, options.coverage, asked.get("deadline_seconds"), cores(), tell, at, options.random_seed, former)
+    found = grow_map(
+        scene, options.coverage, asked.get("deadline_seconds"), cores(), tell, in_s(scene, wanted), options.random_seed, former
+    )
     screen.clear()
     path = ProofFile(args.out).write(scene.name, found.proof.to_bytes())
     share, error = found.coverage

@@ -92,15 +92,14 @@ def has_any(session: Session, job_id: str) -> bool:
 
 def accepted(session: Session, job_id: str) -> tuple[dict[str, Any], bytes | None] | None:
     """Returns the report on the map of a job, and its free set as a file; None where there is no map."""
-    query = select(StepRow.report, StepRow.data).where(StepRow.job_id == job_id, StepRow.kind == ACCEPT, StepRow.state == StepState.DONE)
-    row = session.execute(query).first()
+    row = session.execute(select(StepRow.report, StepRow.data).where(StepRow.job_id == job_id, *_STORED)).first()
     return None if row is None else (row[0] or {}, row[1])
 
 
 def latest(session: Session, scene_id: str) -> str | None:
     """Returns the id of the job that has grown the scene's latest map with a free set; None where there is none."""
-    stored = (StepRow.kind == ACCEPT, StepRow.state == StepState.DONE, StepRow.data.is_not(None))
-    query = select(JobRow.id).join(StepRow, StepRow.job_id == JobRow.id).where(JobRow.scene_id == scene_id, *stored)
+    mine = (JobRow.scene_id == scene_id, *_STORED, StepRow.data.is_not(None))
+    query = select(JobRow.id).join(StepRow, StepRow.job_id == JobRow.id).where(*mine)
     return session.scalar(query.order_by(StepRow.id.desc()).limit(1))
 
 
@@ -114,9 +113,7 @@ def to_take_over(session: Session, job_id: str, kind: str, former: str) -> str:
     Raises:
         CirisError: map_not_found, where it was deleted before the first of these steps.
     """
-    earlier = (StepRow.job_id == job_id, StepRow.kind == kind, StepRow.proof_digest.is_not(None))
-    stored = (StepRow.job_id == former, StepRow.kind == ACCEPT, StepRow.state == StepState.DONE)
-    for where in (earlier, stored):
+    for where in (_noted(job_id, kind), (StepRow.job_id == former, *_STORED)):
         digest = session.scalar(select(StepRow.proof_digest).where(*where).limit(1))
         if digest is not None:
             return digest
@@ -129,8 +126,7 @@ def taken_over(session: Session, job_id: str, kind: str) -> bytes | None:
     Args:
         kind: of the steps that lead the job.
     """
-    noted = (StepRow.job_id == job_id, StepRow.kind == kind, StepRow.proof_digest.is_not(None))
-    digest = session.scalar(select(StepRow.proof_digest).where(*noted).limit(1))
+    digest = session.scalar(select(StepRow.proof_digest).where(*_noted(job_id, kind)).limit(1))
     return None if digest is None else proofs.get(session, digest)
 
 
@@ -147,5 +143,12 @@ def end(session: Session, job_id: str) -> None:
     session.execute(delete(MapPieceRow).where(MapPieceRow.job_id == job_id))
 
 
-def _pieces(job_id: str) -> tuple[Any, Any]:
+_STORED = (StepRow.kind == ACCEPT, StepRow.state == StepState.DONE)
+
+
+def _noted(job_id: str, kind: str) -> tuple[Any, ...]:
+    return StepRow.job_id == job_id, StepRow.kind == kind, StepRow.proof_digest.is_not(None)
+
+
+def _pieces(job_id: str) -> tuple[Any, ...]:
     return StepRow.job_id == job_id, StepRow.kind == PIECE

@@ -30,7 +30,7 @@ from db.models import (
     SubtreesRow,
     WebhookRow,
 )
-from db.states import ACCEPT, JOB, StepState, WebhookState, unfinished
+from db.states import ACCEPT, JOB, WebhookState, unfinished
 
 TOGETHER = 20
 """Number of jobs that expire in one transaction."""
@@ -152,13 +152,13 @@ def _of_job(job_id: str) -> ColumnElement[bool]:
 def _counted(session: Session, which: ColumnElement[bool]) -> Dependents:
     mine = select(JobRow.id).where(which)
     count = select(func.count()).select_from(JobRow).where(which)
-    stored = (JobRow.kind == "map", StepRow.kind == ACCEPT, StepRow.state == StepState.DONE)
+    stored = (StepRow.kind == ACCEPT, StepRow.proof_digest.is_not(None))  # only maps have their proof with this step
     to_tell = (WebhookRow.job_id.in_(mine), WebhookRow.state == WebhookState.WAITING)
     return Dependents(
         jobs=session.scalar(count) or 0,
         unfinished=session.scalar(count.where(JobRow.state.in_(unfinished(JOB)))) or 0,
         regions=session.scalar(select(func.count()).select_from(RegionRow).where(RegionRow.job_id.in_(mine))) or 0,
-        maps=session.scalar(select(func.count()).select_from(StepRow).join(JobRow).where(JobRow.id.in_(mine), *stored)) or 0,
+        maps=session.scalar(select(func.count()).select_from(StepRow).where(StepRow.job_id.in_(mine), *stored)) or 0,
         webhooks=session.scalar(select(func.count()).select_from(WebhookRow).where(*to_tell)) or 0,
         bytes=_bytes(session, mine),
     )

@@ -18,7 +18,6 @@ from certifier.errors import CirisError
 from certifier.growth.options import GrowthOptions
 from certifier.model import Scene
 from certifier.outcome import Outcome
-from certifier.seeding.limits import check_limits
 from certifier.seeding.options import IRIS_SEEDS, SeedOptions
 from db import clock, events, jobs, regions, steps
 from db.models import JobRow
@@ -26,7 +25,7 @@ from db.session import Database
 from db.states import JOB, unfinished
 from db.transaction import Afterwards
 from db.types import utcnow
-from jobs.checks import check_length
+from jobs.checks import check_positions
 from jobs.fields import model_of
 from jobs.kind import Done, Held, Kind, Turn, report_of
 from jobs.moving import move
@@ -72,8 +71,7 @@ class Cover(Kind):
         points = {f"options.{name}[{i}]": q for name in ("seeds", "connect") for i, q in enumerate(given[name])}
         points |= {f"options.paths[{i}][{j}]": q for i, path in enumerate(given["paths"]) for j, q in enumerate(path)}
         for field, q in points.items():
-            check_length(scene, q, field, "seed_wrong_length")
-            check_limits(scene, q, field)
+            check_positions(scene, q, field)
         options = CoverOptions.from_document(given)
         asked = options if options.stages is not None or scene.n <= MOST_JOINTS else replace(options, stages=STAGES)
         return asked.to_document()

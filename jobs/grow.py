@@ -8,10 +8,9 @@ from pydantic import ConfigDict, Field
 
 from certifier.growth.options import GrowthOptions
 from certifier.model import Scene
-from certifier.seeding.limits import check_limits
 from certifier.seeding.options import SeedOptions
 from db.session import Database
-from jobs.checks import check_length
+from jobs.checks import check_length, check_positions
 from jobs.fields import model_of
 from jobs.growing import Growing
 from jobs.request import JobRequest
@@ -49,6 +48,5 @@ class Grow(Growing):
         for i, row in enumerate(seed.C or ()):
             check_length(scene, row, f"seed.C[{i}]", "polytope_shape")
         if seed.q is not None:
-            check_length(scene, seed.q, "seed.q", "seed_wrong_length")
-            check_limits(scene, seed.q, "seed.q")
+            check_positions(scene, seed.q, "seed.q")
         return GrowthOptions.from_document({"kind": "grow", "seed": seed.to_document(), **body.options.model_dump()}).to_document()

@@ -18,13 +18,12 @@ from certifier.model import Scene
 from certifier.names import MAX_NAME
 from certifier.options import read
 from certifier.outcome import Outcome
-from certifier.seeding.limits import check_limits
 from db import jobs, maps, steps
 from db.models import JobRow
 from db.session import Database
 from db.states import ACCEPT, PIECE, JobState
 from db.transaction import Afterwards
-from jobs.checks import check_length
+from jobs.checks import check_positions
 from jobs.fields import model_of
 from jobs.kind import Done, Kind, Turn, report_of
 from jobs.mapping import LEAD, Account, accept, lead, piece
@@ -88,8 +87,7 @@ class Map(Kind):
     def options(self, body: MapRequest, scene: Scene, db: Database) -> dict[str, Any]:
         given = body.options.model_dump()
         for i, q in enumerate(given["at"]):
-            check_length(scene, q, f"options.at[{i}]", "seed_wrong_length")
-            check_limits(scene, q, f"options.at[{i}]")
+            check_positions(scene, q, f"options.at[{i}]")
         return {**asdict(read(MapOptions, given, "options")), "former": None if body.former is None else _former(body.former, db)}
 
     def decide(self, turn: Turn) -> Lead | Finish:

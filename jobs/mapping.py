@@ -6,28 +6,27 @@ before the next one begins. So a process that leads after another one died repea
 
 from __future__ import annotations
 
-import io
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import lru_cache, partial
 from itertools import count
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from cachetools import LRUCache
+from sqlalchemy.orm import Session
 
 from certifier import stored
 from certifier.errors import ProofError
-from certifier.jobs.map import Worker, grow_round, states_of
-from certifier.map.free_set import free_set
+from certifier.jobs.map import Worker, grow_round, in_s, states_of
+from certifier.map.free_set import as_file, free_set
 from certifier.map.growing import Growing, Task, Trees
 from certifier.map.options import MapOptions
 from certifier.map.packed import Entry, pack_entries, pack_tasks, unpack_entries, unpack_tasks
-from certifier.map.pair import Found, PairTree
-from certifier.map.trees import Pairs
-from certifier.model import Array, Scene
+from certifier.map.pair import Found
+from certifier.model import Scene
 from certifier.proof.map import MapProof
 from certifier.verify.map import verify_map
 from db import clock, events, jobs, leases, maps, proofs, steps, workers
@@ -40,6 +39,8 @@ from db.transaction import persistently
 from jobs.kind import Done
 from jobs.scenes import load_scene
 from workers.app import send_work
+
+Value = TypeVar("Value")
 
 LEAD = "map"
 """The kind of the step that leads a job."""
@@ -113,10 +114,11 @@ class _Led:
         """Says whether the next round only keeps which trees are taken over from a former map."""
         return self.rounds == 0 and len(self.growing.taken_over) > 0
 
-    def taken_over(self) -> dict[Pairs, PairTree]:
-        """Returns the trees that were taken over since this was asked last."""
+    def taken_over(self) -> list[Entry]:
+        """Returns the trees that were taken over since this was asked last, without any work on them."""
         new, self.told = self.growing.taken_over[self.told :], len(self.growing.taken_over)
-        return {pairs: self.growing.trees[pairs].pair for pairs in new}
+        none = np.zeros(0, np.int64)
+        return [Entry(pairs, none, Found.of_none(self.growing.trees[pairs].pair.scene.n)) for pairs in new]
 
 
 _led: LRUCache[str, _Led] = LRUCache(2)
@@ -167,14 +169,14 @@ class _Leading:
 
     def begin(self, led: _Led) -> None:
         """Keeps which trees are taken over from a former map."""
-        begun = {0: _taken_over(self._scene, led)}
+        begun = {0: pack_entries(self._scene, led.taken_over())}
         self.saving(lambda session, job: maps.keep(session, job.id, 0, begun))
         led.rounds = 1
 
     def work(self, led: _Led, tasks: Sequence[Task]) -> Iterator[tuple[Task, Found]]:
         """Works on the tasks of a round, keeps what was found, and yields it in the order of the tasks."""
         pieces, number = _divided(tasks), led.rounds
-        more = {len(pieces): _taken_over(self._scene, led)} if led.told < len(led.growing.taken_over) else {}
+        more = {len(pieces): pack_entries(self._scene, led.taken_over())} if led.told < len(led.growing.taken_over) else {}
         if len(pieces) == 1:
             found = {0: worked(self._scene, self._claim.scene_id, tasks)}
             self.saving(lambda session, job: maps.keep(session, job.id, number, found | more))
@@ -262,11 +264,8 @@ class NotLeading(RuntimeError):
 def piece(claim: steps.Claim, scene: Scene) -> Done:
     """Works on a claimed piece of a round."""
 
-    def read() -> bytes:
-        with database().read() as session:
-            return maps.given(session, claim.step_id)
-
-    found = worked(scene, claim.scene_id, unpack_tasks(scene, persistently(read)))
+    tasks = unpack_tasks(scene, _read(lambda session: maps.given(session, claim.step_id)))
+    found = worked(scene, claim.scene_id, tasks)
     return Done({}, lambda session, _: maps.put(session, claim.step_id, found))
 
 
@@ -293,11 +292,11 @@ def accept(claim: steps.Claim, scene: Scene) -> Done:
                 trees.tree(entry.pairs).take(entry.nodes, entry.found)
     proof = trees.proof().to_bytes()
     statement, file = verify_map(proof), _free_set_of(proof)
-    at = [list(q) for q in options.at]
+    states = states_of(trees, in_s(scene, options.at))
     report = {
         "cells": statement.cells,
         "uncovered_pairs": statement.missing,
-        "at": [{"q": q, "state": state} for q, state in zip(at, states_of(trees, in_s(scene, options.at)), strict=True)],
+        "at": [{"q": list(q), "state": state} for q, state in zip(options.at, states, strict=True)],
         "proof": proofs.digest(proof),
         "proof_bytes": len(proof),
         "free_set": file is not None,
@@ -311,26 +310,12 @@ def accept(claim: steps.Claim, scene: Scene) -> Done:
     return Done(report, save)
 
 
-def in_s(scene: Scene, at: Sequence[Sequence[float]]) -> Array:
-    """Returns joint positions, one row for each configuration, in s."""
-    return scene.to_s(scene.in_windows(np.array(at, dtype=float).reshape(-1, scene.n)))
-
-
 def _free_set_of(proof: bytes) -> bytes | None:
     """Returns the free set of a verified map as a file; None where no configuration is proved to be free."""
     try:
-        arrays = free_set(MapProof.from_bytes(proof))
+        return as_file(free_set(MapProof.from_bytes(proof)))
     except ProofError:
         return None
-    written = io.BytesIO()
-    np.savez_compressed(written, **arrays)
-    return written.getvalue()
-
-
-def _taken_over(scene: Scene, led: _Led) -> bytes:
-    """Returns the trees that a map takes over, without any work on them."""
-    none = np.zeros(0, np.int64)
-    return pack_entries(scene, [Entry(pairs, none, Found.of_none(tree.scene.n)) for pairs, tree in led.taken_over().items()])
 
 
 def _divided(tasks: Sequence[Task]) -> list[list[Task]]:
@@ -362,41 +347,33 @@ def _resumed(job_id: str, scene: Scene, options: MapOptions) -> _Led:
 
 
 def _of_round(job_id: str, number: int) -> dict[int, bytes]:
-    def read() -> dict[int, bytes]:
-        with database().read() as session:
-            return maps.of_round(session, job_id, number)
-
-    return persistently(read)
+    return _read(lambda session: maps.of_round(session, job_id, number))
 
 
 def _asked(job_id: str) -> tuple[MapOptions, datetime, JobRow]:
     """Returns the options of a job, the time by the database's clock, and the job's row."""
-
-    def read() -> tuple[MapOptions, datetime, JobRow]:
-        with database().read() as session:
-            job = jobs.get(session, job_id)
-            options = {name: value for name, value in job.options.items() if name != "former"}
-            return stored.value(MapOptions, options), clock.now(session), job
-
-    return persistently(read)
+    now, job = _read(lambda session: (clock.now(session), jobs.get(session, job_id)))
+    options = {name: value for name, value in job.options.items() if name != "former"}
+    return stored.value(MapOptions, options), now, job
 
 
 def _former_of(job_id: str) -> MapProof | None:
     """Returns the map that a job takes over; None where it takes over none."""
-
-    def read() -> bytes | None:
-        with database().read() as session:
-            return maps.taken_over(session, job_id, LEAD)
-
-    former = persistently(read)
+    former = _read(lambda session: maps.taken_over(session, job_id, LEAD))
     return None if former is None else MapProof.from_bytes(former)
 
 
 def _account_of(job_id: str) -> Account:
-    def read() -> Account:
+    known = _read(lambda session: jobs.growth(session, job_id))
+    return NOTHING if known is None else stored.value(Account, known)
+
+
+def _read(look: Callable[[Session], Value]) -> Value:
+    """Returns what is found in the database, which may be away for a while."""
+
+    def read() -> Value:
         with database().read() as session:
-            known = jobs.growth(session, job_id)
-            return NOTHING if known is None else stored.value(Account, known)
+            return look(session)
 
     return persistently(read)
 

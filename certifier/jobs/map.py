@@ -95,6 +95,11 @@ def grow_map(
     return SceneMap(proof, growing.coverage, growing.looked, growing.planes, growing.refused, wanted, seconds, reason)
 
 
+def in_s(scene: Scene, at: Sequence[Sequence[float]]) -> Array:
+    """Returns joint positions, one row for each configuration, in s."""
+    return scene.to_s(scene.in_windows(np.array(at, dtype=float).reshape(-1, scene.n)))
+
+
 def states_of(trees: Trees, at: Array) -> list[str]:
     """Returns ``proved``, ``open`` or ``in_collision`` for configurations, (D, n) in s."""
     free = Plan(trees.scene).free(at)

@@ -46,10 +46,16 @@ def of_file(payload: dict[str, Any]) -> dict[str, Any]:
     data = read_file(payload["path"])
     statement = verify_map(data, payload["processes"])
     proof = MapProof.from_bytes(data)
-    arrays, written = free_set(proof), io.BytesIO()
-    np.savez_compressed(written, **arrays)
-    file = base64.b64encode(written.getvalue()).decode()
+    arrays = free_set(proof)
+    file = base64.b64encode(as_file(arrays)).decode()
     return {"name": proof.scene.name, "cells": statement.cells, "nodes": len(arrays["joint"]), "free_set": file}
+
+
+def as_file(arrays: dict[str, Any]) -> bytes:
+    """Returns what :func:`free_set` gives as a file."""
+    written = io.BytesIO()
+    np.savez_compressed(written, **arrays)
+    return written.getvalue()
 
 
 def checked(payload: dict[str, Any]) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
+from fastapi.testclient import TestClient
 
 from certifier.model import Scene
 from certifier.orphans import die_with_parent
@@ -146,6 +147,15 @@ def submit(scene: Scene, options: dict[str, Any], **values: Any) -> str:
         job, _ = jobs.create(session, kind=options["kind"], scene_id=row.id, options=options, **values)
     send_coordinate(job.id)
     return job.id
+
+
+def asked(client: TestClient, scene: Scene, kind: str, **request: Any) -> str:
+    """Asks for a job over HTTP, and returns its id."""
+    with database().write() as session:
+        row = scenes.add(session, scene)
+    answer = client.post("/v1/jobs", json={"kind": kind, "scene": row.id, **request})
+    assert answer.status_code == 201, answer.json()
+    return str(answer.json()["id"])
 
 
 def job_of(job_id: str) -> JobRow:

@@ -7,6 +7,7 @@ import signal
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from db import jobs, scenes
 from db.models import JobRow, MapPieceRow, StepRow
 from db.session import database
 from tests.certifier.scenes import box, planar_arm
+from tests.workers import service as workers_service
 from tests.workers.service import Service, ended, events_of, eventually, job_of
 from workers.app import send_coordinate
 
@@ -33,6 +35,9 @@ pytestmark = [pytest.mark.usefixtures("service"), pytest.mark.lengthy]
 FREE, HIT = [0.2, -0.4], [0.0, 1.5]
 COVERAGE = 0.84
 """Of the arm: rounds with several pieces, in some seconds."""
+
+
+asked = partial(workers_service.asked, kind="map")
 
 
 @pytest.fixture
@@ -44,14 +49,6 @@ def client(service: Service) -> Iterator[TestClient]:
 @pytest.fixture(scope="module")
 def local(arm: tuple[Scene, np.ndarray]) -> bytes:
     return grow_map(arm[0], COVERAGE).proof.to_bytes()
-
-
-def asked(client: TestClient, scene: Scene, **request: Any) -> str:
-    with database().write() as session:
-        row = scenes.add(session, scene)
-    answer = client.post("/v1/jobs", json={"kind": "map", "scene": row.id, **request})
-    assert answer.status_code == 201, answer.json()
-    return str(answer.json()["id"])
 
 
 def found(client: TestClient, job_id: str) -> dict[str, Any]:

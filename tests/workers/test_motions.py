@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from db import jobs, scenes, steps
 from db.models import JobRow, StepRow
 from db.session import database
 from tests.certifier.motions import swing
+from tests.workers import service as workers_service
 from tests.workers.service import Service, ended, events_of, eventually
 from workers.app import send_coordinate
 
@@ -27,6 +29,9 @@ pytestmark = [pytest.mark.usefixtures("service"), pytest.mark.lengthy]
 
 FREE = [[0.2, -0.4], [-0.4, 0.3]]
 LAPS = 600
+
+
+asked = partial(workers_service.asked, kind="certify-path")
 
 
 @pytest.fixture
@@ -42,14 +47,6 @@ def submit(scene: Scene, motion: dict[str, Any], seconds: float | None = None) -
         job, _ = jobs.create(session, kind="certify-path", scene_id=row.id, options=motion, deadline_seconds=seconds)
     send_coordinate(job.id)
     return job.id
-
-
-def asked(client: TestClient, scene: Scene, **motion: Any) -> str:
-    with database().write() as session:
-        row = scenes.add(session, scene)
-    answer = client.post("/v1/jobs", json={"kind": "certify-path", "scene": row.id, **motion})
-    assert answer.status_code == 201, answer.json()
-    return str(answer.json()["id"])
 
 
 def step_of(job_id: str) -> StepRow | None:
