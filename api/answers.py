@@ -25,14 +25,17 @@ def asked(db: Database, libraries: Libraries, name: str) -> tuple[str, Scene, Li
     return scene_id, scene, libraries.of(db, scene_id, scene.n)
 
 
-def pieces(library: Library, tubes: Tubes, stretches: Sequence[path.Stretch]) -> list[Piece]:
-    return [Piece(begin=s.begin, end=s.end, **_proved_by(library, tubes, s.region)) for s in stretches]
+def pieces(library: Library, tubes: Tubes, stretches: Sequence[path.Stretch], map_job: str | None = None) -> list[Piece]:
+    """Returns the pieces of a motion, each with the region, the motion or the job of the map that proves it."""
+    return [Piece(begin=s.begin, end=s.end, **_proved_by(library, tubes, s.region, map_job)) for s in stretches]
 
 
-def _proved_by(library: Library, tubes: Tubes, number: int) -> dict[str, Any]:
+def _proved_by(library: Library, tubes: Tubes, number: int, map_job: str | None) -> dict[str, Any]:
     if number < len(library):
         return {"region": library.ids[number], "guarantee": guarantee(library, number)}
-    return {"region": None, "motion": tubes.motions[number - len(library)].id, "guarantee": Guarantee.EXACT}
+    if number < len(library) + len(tubes):
+        return {"region": None, "motion": tubes.motions[number - len(library)].id, "guarantee": Guarantee.EXACT}
+    return {"region": None, "map": map_job, "guarantee": Guarantee.EXACT}
 
 
 def uncovered(library: Library, scene: Scene, stop: path.Uncovered | None) -> Uncovered | None:

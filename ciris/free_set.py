@@ -156,6 +156,29 @@ class FreeSet(InSpace):
         """
         from ciris.lookups import open_ranges
 
+        rows, ends = self._one(start, end)
+        parts = []
+        for clause, pairs in enumerate(self.clauses):
+            for begin, until in _joined(open_ranges(self._cells, clause, rows, ends - rows)):
+                parts.append(OpenPart(begin, until, pairs))
+        return tuple(sorted(parts, key=lambda part: (part.start, part.end)))
+
+    def proved_parts(self, start: ArrayLike, end: ArrayLike) -> Array:
+        """Returns where a motion from one configuration straight to another, (n,) each, is proved to be free: shares of it, (k, 2).
+
+        Raises:
+            RegionError: as :meth:`open_parts`.
+        """
+        from ciris.lookups import open_ranges
+
+        rows, ends = self._one(start, end)
+        ranges = [open_ranges(self._cells, clause, rows, ends - rows) for clause in range(len(self.clauses))]
+        ordered = _joined(np.concatenate(ranges))
+        proved = zip([0.0, *(until for _, until in ordered)], [*(begin for begin, _ in ordered), 1.0], strict=True)
+        return np.array([part for part in proved if part[0] < part[1]]).reshape(-1, 2)
+
+    def _one(self, start: ArrayLike, end: ArrayLike) -> tuple[Array, Array]:
+        """Returns the two ends of one motion, (n,) each, within the joint limits."""
         first, rows, ends = self._ends(start, end)
         if first.ndim != 1:
             raise RegionError("motion", "these are several motions", field="start", hint="ask for one at a time")
@@ -165,11 +188,7 @@ class FreeSet(InSpace):
                 i = outside[0]
                 hint = f"its limits are {self.space.q_lower[i]:.6g} and {self.space.q_upper[i]:.6g}"
                 raise RegionError("outside_limits", f"{self.joints[i]} is {q[i]:.6g}, beyond its limits", field=field, hint=hint)
-        parts = []
-        for clause, pairs in enumerate(self.clauses):
-            for begin, until in _joined(open_ranges(self._cells, clause, rows[0], ends[0] - rows[0])):
-                parts.append(OpenPart(begin, until, pairs))
-        return tuple(sorted(parts, key=lambda part: (part.start, part.end)))
+        return rows[0], ends[0]
 
     def _ends(self, start: ArrayLike, end: ArrayLike) -> tuple[Array, Array, Array]:
         """Returns the starts as they were given, and starts and ends as rows."""

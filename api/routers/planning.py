@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated
 
@@ -31,13 +30,11 @@ from api.schemas.planning import (
     NearestResponse,
     PathRequest,
     PathResponse,
-    Piece,
     SegmentRequest,
     SegmentResponse,
 )
 from certifier.model import Array, Scene
 from certifier.motion.splines import Curve, curve
-from certifier.outcome import Guarantee
 from db.session import Database
 from planner.library import Library
 from planner.membership import locate, to_s
@@ -92,7 +89,7 @@ def cover_segments(
 ) -> SegmentResponse:
     """Says of each straight motion whether every point of it is proved to be free, and what proves it.
 
-    The scene's latest map is asked about motions that are straight in `q`, and certified regions and tubes of motions about all others.
+    Certified regions are asked, and for motions that are straight in `q` the tubes of proved motions and the scene's latest map.
     `covered` is proved, for the numbers of the request taken literally. A motion that is straight in `s` is cut with the regions exactly.
     One that is straight in `q` is proved piece by piece, with bounds on what lies between, so one that only touches may not be proved.
     """
@@ -174,20 +171,8 @@ def _covering(
     times: Sequence[float],
     degree: int = 1,
 ) -> Covering:
-    """Covers a motion from its start on. The map covers whole segments between two waypoints, and regions and tubes the rows of others."""
-    last = (len(controls) - 1) // degree
-    by_map = np.zeros(last, bool)
-    if mapped is not None and degree == 1 and space is Space.Q:
-        by_map = mapped.free.contains_motion(controls[:-1], controls[1:])
-    pieces: list[Piece] = []
-    for begin, end in pairwise([0, *(np.flatnonzero(np.diff(by_map)) + 1).tolist(), last]):
-        if by_map[begin] and mapped is not None:
-            pieces.append(Piece(begin=times[begin], end=times[end], region=None, map=mapped.job, guarantee=Guarantee.EXACT))
-            continue
-        part = controls[begin * degree : end * degree + 1]
-        found = follow(library, scene, space, part, times[begin : end + 1], degree, tubes)
-        pieces += answers.pieces(library, tubes, found.stretches)
-        if found.uncovered is not None:
-            stop = replace(found.uncovered, segment=begin + found.uncovered.segment)
-            return Covering(covered=False, pieces=pieces, uncovered=answers.uncovered(library, scene, stop))
-    return Covering(covered=True, pieces=pieces, uncovered=None)
+    """Covers a motion from its start on, with all that is proved."""
+    free, job = (None, None) if mapped is None else (mapped.free, mapped.job)
+    found = follow(library, scene, space, controls, times, degree, tubes, free)
+    pieces = answers.pieces(library, tubes, found.stretches, job)
+    return Covering(covered=found.uncovered is None, pieces=pieces, uncovered=answers.uncovered(library, scene, found.uncovered))

@@ -232,9 +232,7 @@ class Piece(BaseModel):
     motion: MotionId | None = Field(
         default=None, description="The proved motion whose tube contains the motion here; null for a region or a map.", examples=[MOTION]
     )
-    map: MapJob | None = Field(
-        default=None, description="The job whose map proves the motion here, from one waypoint to another; null for the others."
-    )
+    map: MapJob | None = Field(default=None, description="The job whose map proves the motion here; null for the others.")
     guarantee: Guarantee = Field(description="What the certificate is worth.", examples=["exact"])
 
 

@@ -9,10 +9,11 @@ import numpy as np
 
 from certifier.model import Array, Scene
 from certifier.positions import check_magnitude
+from ciris.free_set import FreeSet
 from planner.library import Library
 from planner.membership import locate, to_s
 from planner.motion.beside import Beside
-from planner.motion.cover import Line, cover
+from planner.motion.cover import Cover, Line, Piece, cover
 from planner.motion.curve import Curve, at
 from planner.motion.space import Space
 from planner.motion.straight_s import StraightInS
@@ -24,7 +25,7 @@ from planner.tubes import Tubes
 class Stretch:
     """Says that a region contains all of the path from begin to end, in the unit of the path's times.
 
-    From the number of regions on, ``region`` counts the motions whose tubes contain it.
+    From the number of regions on, ``region`` counts the motions whose tubes contain it; the number after them is the map's.
     """
 
     begin: float
@@ -67,8 +68,11 @@ def follow(
     times: Sequence[float],
     degree: int = 1,
     tubes: Tubes | None = None,
+    free: FreeSet | None = None,
 ) -> Covering:
-    """Covers a path with certified regions, and with the tubes of proved motions where it is straight in q.
+    """Covers a path with certified regions, and where it is straight in q with the tubes of proved motions and with a map's free set.
+
+    A segment that the map covers from end to end is the map's. Elsewhere it is the region, the tube or the map that goes on for longest.
 
     Args:
         controls: (k m + 1, n), k >= 1, in the coordinates of ``space``: control points of k segments of degree m. Those of segment i are
@@ -80,15 +84,20 @@ def follow(
         RegionError: number_too_large, for a control point.
     """
     check_magnitude(controls, "controls")
+    straight = degree == 1
+    if not straight or space is Space.S:
+        tubes = free = None
+    by_map = np.zeros(len(controls), bool) if free is None else free.contains_motion(controls[:-1], controls[1:])
+    the_map = len(library) + (0 if tubes is None else len(tubes))
     stretches: list[Stretch] = []
     for i in range((len(controls) - 1) // degree):
         segment = controls[i * degree : (i + 1) * degree + 1]
         last = stretches[-1].region if stretches and stretches[-1].region < len(library) else None
-        straight = space is Space.S and degree == 1
-        line: Line = StraightInS(library, *segment) if straight else Curve(library, scene, space, segment, last)
-        if tubes is not None and len(tubes) and space is Space.Q and degree == 1:
-            line = Beside(line, tubes, len(library), *segment)
-        found = cover(line)
+        if by_map[i]:
+            found = Cover((Piece(0.0, 1.0, the_map),), None)
+        else:
+            line: Line = StraightInS(library, *segment) if straight and space is Space.S else Curve(library, scene, space, segment, last)
+            found = cover(Beside(line, tubes, free, len(library), *segment) if straight and space is Space.Q else line)
         for piece in found.pieces:
             begin, end = (_time(times[i], times[i + 1], t) for t in (piece.begin, piece.end))
             if stretches and stretches[-1].region == piece.region:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 import subprocess
 import sys
 from contextlib import suppress
@@ -21,10 +20,8 @@ from certifier.errors import CirisError, RegionError
 from certifier.map import free_set
 from certifier.proof import limits
 from ciris import FreeSet, lookups
+from tests.free_sets import LIMIT, OPEN, PROVED, N, written
 
-N = 3
-LIMIT = 2.0
-PROVED, OPEN = -1, -2
 Leaf = tuple[list[Fraction], list[Fraction], bool]
 
 
@@ -61,50 +58,6 @@ def leaves(tree: Any, lower: list[Fraction], upper: list[Fraction]) -> list[Leaf
     below, above = upper.copy(), lower.copy()
     below[joint] = above[joint] = Fraction(cut)
     return leaves(low, lower, below) + leaves(high, above, upper)
-
-
-def written(path: Path, wanted: list[list[Any]], **changes: Any) -> Path:
-    """A file as ``ciris free-set`` writes them."""
-    joint, cut, upper, root, first, tree = [], [], [], [], [0], []
-
-    def add(node: Any) -> None:
-        at = len(joint)
-        joint.append(node if isinstance(node, int) else node[0])
-        cut.append(0.0 if isinstance(node, int) else node[1])
-        upper.append(0)
-        if not isinstance(node, int):
-            add(node[2])
-            upper[at] = len(joint)
-            add(node[3])
-
-    for members in wanted:
-        for node in members:
-            root.append(len(joint))
-            tree.append(len(tree))
-            add(node)
-        first.append(len(tree))
-    head = {
-        "format": 1,
-        "scene": "0" * 64,
-        "name": "cell",
-        "joints": ["a", "b", "c"],
-        "clauses": [[[f"a{i}", f"b{i}"]] for i in range(len(wanted))],
-    }
-    arrays = {
-        "q_star": np.zeros(N),
-        "q_lower": np.full(N, -LIMIT),
-        "q_upper": np.full(N, LIMIT),
-        "revolute": np.ones(N, bool),
-        "joint": np.array(joint, np.int16),
-        "cut": np.array(cut),
-        "upper": np.array(upper, np.int32),
-        "root": np.array(root, np.int32),
-        "first": np.array(first, np.int32),
-        "tree": np.array(tree, np.int32),
-    }
-    head |= changes.pop("head", {})
-    np.savez(path, head=np.array(json.dumps(head)), **(arrays | changes))
-    return path
 
 
 def free_at(cells: list[list[list[Leaf]]], q: list[Fraction]) -> bool:
@@ -146,6 +99,11 @@ def test_it_says_what_exact_fractions_say(tmp_path_factory, drawn, motions) -> N
         parts = found.open_parts(a, b)
         assert (parts == ()) == free
         assert all(0 <= part.start <= part.end <= 1 for part in parts)
+        proved = found.proved_parts(a, b)
+        assert (proved.tolist() == [[0.0, 1.0]]) == free
+        x, dx = ([Fraction(v) for v in vector.tolist()] for vector in (a, b - a))
+        for part in proved.tolist():
+            assert free_along(cells, *([v + Fraction(t) * dv for v, dv in zip(x, dx, strict=True)] for t in part))
 
 
 def test_open_parts_say_where_and_between_which_bodies(tmp_path: Path) -> None:
@@ -155,6 +113,8 @@ def test_open_parts_say_where_and_between_which_bodies(tmp_path: Path) -> None:
     assert (part.start, part.end) == (pytest.approx(0.25, abs=1e-8), pytest.approx(0.75, abs=1e-8))
     assert part.pairs == (("a1", "b1"),)
     assert found.open_parts([-1.0, 0, 0], [-0.6, 0, 0]) == ()
+    np.testing.assert_allclose(found.proved_parts([-1.0, 0, 0], [1.0, 0, 0]), [[0, 0.25], [0.75, 1]], atol=1e-8)
+    assert found.proved_parts([0.0, 0, 0], [0.4, 0, 0]).shape == (0, 2)
     assert found.contains([[-1.0, 0, 0], [0.0, 0, 0], [0.5, 0, 0], [0.5 + 1e-8, 0, 0]]).tolist() == [True, False, False, True]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,12 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from certifier.model import Array, Joint, JointKind, Scene, StoredRegion
+from ciris import FreeSet
 from planner.library import Library
 from planner.motion.cover import Cover, cover
 from planner.motion.curve import Curve
 from planner.motion.path import follow
 from planner.motion.space import Space
 from planner.motion.straight_s import StraightInS
+from tests.free_sets import OPEN, PROVED, written
 from tests.planner.regions import box, cut_boxes, library
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -240,3 +243,20 @@ def test_a_path_stays_in_the_region_that_it_is_in_for_as_long_as_that_contains_i
     found = follow(stored, arm(2), Space.Q, 2 * np.arctan(s), [float(i) for i in range(41)])
     assert [part.region for part in found.stretches] == [1, 0]
     assert found.stretches[0].end == 34.0, "the next segment ends on its face"
+
+
+def test_a_map_and_a_region_share_a_line_and_the_map_takes_whole_segments(tmp_path: Path) -> None:
+    scene = arm(3)
+    stored = library(box("a", [-0.5] * 3, [0.1] * 3))
+    tree = (0, 0.1, OPEN, PROVED)  # The map proves what is beyond 0.1, and the region ends at 2 atan 0.1.
+    free = FreeSet.load(written(tmp_path / "cell.npz", [[tree]]))
+    path = np.array([[-0.4, 0.0, 0.0], [0.4, 0.0, 0.0], [0.8, 0.1, 0.0], [-0.4, 0.0, 0.0], [-1.2, 0.0, 0.0]])
+    found = follow(stored, scene, Space.Q, path, [0.0, 8.0, 10.0, 22.0, 30.0], free=free)
+    ends = [(part.begin, part.end, part.region) for part in found.stretches]
+    beyond = 2 * np.arctan(0.1)
+    assert [part[2] for part in ends] == [0, 1, 0]
+    np.testing.assert_allclose(ends[0][:2], [0.0, 10 * (0.4 + beyond)], atol=1e-6)
+    np.testing.assert_allclose(ends[1], [10 * (0.4 + beyond), 10.0 + 12 * 0.7 / 1.2, 1], atol=1e-6)
+    assert found.uncovered is not None
+    assert found.uncovered.segment == 3
+    assert follow(stored, scene, Space.S, np.tan(path / 2), range(5), free=free).stretches[0].region == 0

@@ -140,11 +140,11 @@ def running_service(database_url: str, queue_url: str, logs: Path, **variables: 
             service.stop()
 
 
-def submit(scene: Scene, options: dict[str, Any], **values: Any) -> str:
+def submit(scene: Scene, options: dict[str, Any], kind: str | None = None, **values: Any) -> str:
     """Commits a job and asks for its coordination; returns its id."""
     with database().write() as session:
         row = scenes.add(session, scene)
-        job, _ = jobs.create(session, kind=options["kind"], scene_id=row.id, options=options, **values)
+        job, _ = jobs.create(session, kind=kind or options["kind"], scene_id=row.id, options=options, **values)
     send_coordinate(job.id)
     return job.id
 

@@ -6,17 +6,23 @@ import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 import redis
+from sqlalchemy import select
 
+from certifier.jobs.map import grow_map
+from certifier.map.options import MapOptions
 from certifier.model import Scene
 from certifier.orphans import die_with_parent
-from db import migrate
+from db import migrate, proofs
+from db.models import StepRow
+from db.session import database
+from db.states import ACCEPT, StepState
 from tests.services import free_port, postgres_server
 from tests.workers import links
 from tests.workers.links import DATABASE, REDIS, Machine
@@ -86,6 +92,13 @@ def redis_server(directory: Path, port: int, reachable: list[str]) -> ExitStack:
 def work_of(job_id: str, machine: Machine) -> list[int]:
     """The pairs that a machine holds or has certified."""
     return [row.pair_index for row in pairs_of(job_id) if row.parent and int(row.parent.split(":")[1]) == machine.pid]
+
+
+def holds_a_step(job_id: str, machine: Machine) -> bool:
+    """Whether a machine works on a step of a job."""
+    with database().read() as session:
+        parents = session.scalars(select(StepRow.parent).where(StepRow.job_id == job_id, StepRow.state == StepState.RUNNING))
+        return any(parent is not None and int(parent.split(":")[1]) == machine.pid for parent in parents)
 
 
 def job(arm: tuple[Scene, np.ndarray], radius: float) -> str:
@@ -177,3 +190,25 @@ def test_a_region_of_cells_is_the_same_though_a_link_is_cut_again_and_again(plan
     assert cuts > 0
     print(f"{cuts} cuts")
     assert region_of(job_id) == region_of(undisturbed)
+
+
+@pytest.mark.parametrize("link", [REDIS, DATABASE])
+def test_a_map_is_the_same_though_a_link_is_cut_again_and_again(arm: tuple[Scene, np.ndarray], site: Site, link: str) -> None:
+    scene, options = arm[0], MapOptions(coverage=0.84)
+    job_id, cuts = submit(scene, {**asdict(options), "former": None}, kind="map"), 0
+    while not job_of(job_id).finished_at:
+        if not holds_a_step(job_id, site.first):
+            time.sleep(0.01)
+            continue
+        site.first.cut(link)
+        time.sleep(2.0)
+        site.first.restore(link)
+        cuts += 1
+        time.sleep(1.0)
+    assert job_of(job_id).state == "succeeded", job_of(job_id).reason
+    assert cuts > 0
+    print(f"{cuts} cuts")
+    with database().read() as session:
+        digest = session.scalar(select(StepRow.proof_digest).where(StepRow.job_id == job_id, StepRow.kind == ACCEPT))
+        assert digest is not None
+        assert proofs.get(session, digest) == grow_map(scene, options.coverage).proof.to_bytes()
