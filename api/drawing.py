@@ -22,6 +22,7 @@ from api.schemas.drawing import (
     SliceRequest,
     SliceResponse,
 )
+from certifier.conditions import of_condition
 from certifier.errors import RegionError
 from certifier.isolation.child import run_in_child
 from certifier.model import Array, Geometry, Scene
@@ -70,12 +71,13 @@ def model(scene_id: str, scene: Scene) -> SceneModel:
 
 
 def _drawn(geometry: Geometry) -> DrawnGeometry:
+    shown = not of_condition(geometry.name)  # What stands for a condition is no body of the robot.
     return DrawnGeometry(
         name=geometry.name,
         body=geometry.body,
-        radius=geometry.radius,
-        vertices=geometry.vertices.tolist(),
-        triangles=triangles(geometry.vertices).tolist(),
+        radius=geometry.radius if shown else 0.0,
+        vertices=geometry.vertices.tolist() if shown else [],
+        triangles=triangles(geometry.vertices).tolist() if shown else [],
         substitution=geometry.substitution,
     )
 

@@ -31,7 +31,7 @@ def npz(manifest: Document, arrays: Arrays, name: str) -> tuple[bytes, str]:
     name (), C (m, n) and d (m,) with the joint limits, center (n,), ellipsoid_center (n,), ellipsoid_shape (n, n); and what s means: joints
     (n,) by name, q_star, q_lower and q_upper (n,), and revolute (n,), which is true where s = tan((q - q_star) / 2) and false where
     s = q - q_star. What the proof is not about: not_covered (k, 2), names of two bodies, not_covered_pairs (k,), how many pairs of their
-    geometries, not_covered_why (k,), and not_covered_summary (), a sentence.
+    geometries, not_covered_why (k,), and not_covered_summary (), a sentence. What else it is about: conditions (c,), in words.
     """
     buffer = io.BytesIO()
     ellipsoid, space, uncovered = manifest["inscribed_ellipsoid"], manifest["space"], manifest["not_covered"]
@@ -46,6 +46,7 @@ def npz(manifest: Document, arrays: Arrays, name: str) -> tuple[bytes, str]:
         "not_covered_pairs": np.array([one["pairs"] for one in uncovered["bodies"]], dtype=int),
         "not_covered_why": np.array([one["reason"] or one["why"] for one in uncovered["bodies"]], dtype=str),
         "not_covered_summary": np.array(uncovered["summary"]),
+        "conditions": np.array([f"{one['name']}: {one['statement']}" for one in manifest.get("conditions", ())], dtype=str),
     }
     # Regions that an earlier checkout stored do not say which joints turn.
     contents |= {name: np.array(space[name]) for name in ("joints", "q_star", "q_lower", "q_upper", "revolute") if name in space}
@@ -56,13 +57,14 @@ def npz(manifest: Document, arrays: Arrays, name: str) -> tuple[bytes, str]:
 def drake_yaml(manifest: Document, arrays: Arrays, name: str) -> tuple[bytes, str]:
     """Writes the region as Drake's IrisRegions in YAML: one HPolyhedron in s under its name. Comments say what s means.
 
-    Other comments say which pairs the proof does not cover.
+    Other comments say which conditions hold, and which pairs the proof does not cover.
     """
     C, d, space = arrays["C"], arrays["d"], manifest["space"]
     rows = "\n".join(f"    - [{_numbers(c)}]" for c in C)
     joints = "\n".join(f"#   {_meaning(space, i)}" for i in range(len(space["joints"])))
     uncovered = manifest["not_covered"]
-    besides = "\n".join((f"# {uncovered['summary']}", *(f"#   {line}" for line in named(uncovered))))
+    conditions = [f"# condition {one['name']}: {one['statement']}" for one in manifest.get("conditions", ())]
+    besides = "\n".join((*conditions, f"# {uncovered['summary']}", *(f"#   {line}" for line in named(uncovered))))
     head = f"# A certified region of {manifest['scene']['name']} in tangent-space coordinates s, one for each joint:\n{joints}\n{besides}\n"
     text = f'{head}"{name}":\n  ambient_dimension: {C.shape[1]}\n  A:\n{rows}\n  b: [{_numbers(d)}]\n'
     return text.encode(), "yaml"

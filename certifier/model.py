@@ -20,6 +20,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from certifier import conditions
+from certifier.conditions import Condition
 from certifier.configurations import Configurations, is_configuration_name
 from certifier.coordinates import ConfigurationSpace
 from certifier.document import LARGEST, Node
@@ -156,6 +158,8 @@ class Scene(ConfigurationSpace):
         provenance: how the scene was made (directives, package roots, versions of Drake and CoACD, how far hulls reach beyond their
             meshes, which of these bound no solid); not part of the hash.
         configurations: the named configurations: positions of joints by their full names, radians or metres; not part of the hash.
+        conditions: what else holds where the pairs are apart. Geometries that stand for them are among the others
+            (certifier.conditioned), and certifier.conditions.of_condition knows them by their names.
     """
 
     name: str
@@ -169,6 +173,7 @@ class Scene(ConfigurationSpace):
     warnings: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
     configurations: Configurations = field(default_factory=dict)
+    conditions: tuple[Condition, ...] = ()
     revolute: NDArray[np.bool_] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -196,7 +201,8 @@ class Scene(ConfigurationSpace):
     @property
     def in_order(self) -> str:
         """Returns the names of the n joints in position order, and which ones follow them, for the hint of an error."""
-        behind = [f"{joint.name} follows {self.leader_of(joint).name}" for joint in self.following]
+        own = (joint for joint in self.following if not conditions.of_condition(joint.name))
+        behind = [f"{joint.name} follows {self.leader_of(joint).name}" for joint in own]
         return "; ".join([f"in order: {', '.join(joint.name for joint in self.moving)}", *behind])
 
     @cached_property
@@ -286,6 +292,11 @@ class Scene(ConfigurationSpace):
         return self._pairs_of.get(name, [])
 
     @cached_property
+    def body_pairs(self) -> tuple[Pair, ...]:
+        """Returns the pairs that stand for no condition."""
+        return tuple(pair for pair in self.pairs if not (conditions.of_condition(pair.a) or conditions.of_condition(pair.b)))
+
+    @cached_property
     def _own_paddings(self) -> dict[Pair, float]:
         return {pair: pair.padding for pair in self.pairs if pair.padding is not None}
 
@@ -334,7 +345,9 @@ class Scene(ConfigurationSpace):
 
     def _content(self) -> dict[str, Any]:
         other = self.other_paddings()
-        return {
+        # Scenes without conditions keep the hash that they had before there were any.
+        own = {"conditions": [conditions.to_document(one) for one in self.conditions]} if self.conditions else {}
+        return own | {
             "schema_version": SCHEMA_VERSION,
             "joints": [_plain(joint) for joint in self.joints],
             "bodies": list(self.bodies),
@@ -389,7 +402,7 @@ def _read(document: Any) -> Scene:
         message = f"the scene's schema version is not {SCHEMA_VERSION}"
         raise SceneError("scene_schema", message, field="schema_version", hint=_STORED)
     content = ("schema_version", "name", "joints", "bodies", "geometries", "pairs", "ignored", "q_star", "padding")
-    scene = Node(document).fields(*content, optional=("hash", "warnings", "provenance", "configurations"))
+    scene = Node(document).fields(*content, optional=("hash", "warnings", "provenance", "configurations", "conditions"))
     return Scene(
         name=scene["name"].text(),
         joints=tuple(_joint(joint) for joint in scene["joints"].items()),
@@ -402,6 +415,7 @@ def _read(document: Any) -> Scene:
         warnings=tuple(warning.text() for warning in scene["warnings"].items()) if "warnings" in scene else (),
         provenance=scene["provenance"].free() if "provenance" in scene else {},
         configurations=_configurations(scene["configurations"], scene["joints"]) if "configurations" in scene else {},
+        conditions=tuple(map(conditions.from_document, scene["conditions"].items())) if "conditions" in scene else (),
     )
 
 

@@ -91,6 +91,8 @@ def scene_show(args: Namespace) -> int:
         print(f"{item['geometry']}: {item['substitution']} (reaches outside by at most {at_most_mm(item['inflation'])})")
     for item in lint["ignored"]:
         print(f"ignored: {item['a']} - {item['b']} ({item['reason']})")
+    for one in scene["conditions"]:
+        print(f"condition {one['name']}: {one['statement']}")
     _print_not_covered(scene["not_covered"])
     for warning in lint["warnings"]:
         print("warning:", warning)

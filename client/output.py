@@ -176,6 +176,7 @@ def print_region(manifest: dict[str, Any], extra: Iterable[tuple[str, str]] = ()
             *([("share", f"{share(kept)} of the proposal's collision-free part")] if kept else []),
             ("pairs", f"{sum(p['outcome'] == 'certified' for p in pairs)} of {len(pairs)} certified, {len(manifest['ignored'])} ignored"),
             *([("", manifest["not_covered"]["summary"])] if "not_covered" in manifest else []),
+            *(("condition", f"{one['name']}: {one['statement']}") for one in manifest.get("conditions", ())),
             *([("proved distance", f"at least {distance(least['margin'])}: {least['a']} - {least['b']}")] if least else []),
             ("guarantee", manifest["guarantee"]),
             *extra,

@@ -211,7 +211,8 @@ def _why_not(answer: dict[str, Any]) -> str:
     if touching := answer["collision"]:
         how = "overlap" if touching["depth"] is None else f"overlap by {at_least_mm(touching['depth'])}"
         free = f"; free near by: {_place(touching['free'])}" if touching["free"] else ""
-        return f"{_field(touching['where'])}: {touching['a']} and {touching['b']} {how}{free}"
+        what = touching["condition"] or f"{touching['a']} and {touching['b']} {how}"
+        return f"{_field(touching['where'])}: {what}{free}"
     if reached := answer["reached"]:
         nearest = f"the nearest that was found is off by {1000 * reached['metres']:.3g} mm and {reached['radians']:.3g} rad"
         return f"--to-pose: no configuration reaches it; {nearest}, at q = {_place(reached['q'])}"

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from certifier.conditioned import condition_of
+from certifier.conditions import of_condition
 from certifier.configurations import is_number
 from certifier.errors import CirisError
 from certifier.kinematics import Kinematics
@@ -19,6 +21,7 @@ from certifier.scene.draft import Draft, Part, draft
 from certifier.scene.hollow import beyond
 from certifier.scene.load import load_scene
 from certifier.seeding.limits import check_limits
+from certifier.verify.conditions import conditions
 from certifier.verify.decimals import at_most_mm
 from certifier.verify.paddings import paddings
 from certifier.verify.uncovered import unlisted
@@ -124,12 +127,16 @@ def scene_check(args: Namespace) -> int:
     q, whence = _configuration(scene, args)
     check_limits(scene, q, "q")
     (touches,) = touching(scene, [scene.in_windows(q)])
-    bad = sorted((pair for pair in touches if pair in set(scene.pairs)), key=lambda p: (p.a, p.b))
+    broken = sorted((pair for pair in touches if pair in set(scene.pairs)), key=lambda p: (p.a, p.b))
+    bad = [pair for pair in broken if condition_of(scene, pair) is None]
     costs = sorted(forecast(scene), key=lambda cost: -cost.seconds)
     if args.json:
-        output.print_json(_document(scene, q, [[p.a, p.b] for p in bad], costs))
-        return 1 if bad else 0
-    print(f"{scene.name}: {scene.n} joints, {len(scene.geometries)} geometries, {len(scene.pairs)} pairs, {len(scene.ignored)} ignored")
+        output.print_json(_document(scene, q, [[p.a, p.b] for p in broken], costs))
+        return 1 if broken else 0
+    geometries = sum(not of_condition(geometry.name) for geometry in scene.geometries)
+    print(f"{scene.name}: {scene.n} joints, {geometries} geometries, {len(scene.body_pairs)} pairs, {len(scene.ignored)} ignored")
+    for line in conditions(scene):
+        print(line)
     print()
     output.print_table(("joint", "kind", "lower", "upper", "q*", "q", ""), _joints(scene, q), right="lower upper q* q")
     output.print_configurations(scene.configurations)
@@ -148,14 +155,16 @@ def scene_check(args: Namespace) -> int:
     for pair in bad:
         padded = f", with a padding of {scene.padding_of(pair):g} m on each" if scene.padding_of(pair) else ""
         print(f"touching at {whence}: {pair.a} and {pair.b}{padded}")
-    if not bad:
+    for name in dict.fromkeys(one.name for pair in broken if (one := condition_of(scene, pair))):
+        print(f"not kept at {whence}: the condition {name}")
+    if not broken:
         print(f"nothing touches at {whence}")
     print(f"one plane for a pair: {output.seconds(sum(cost.seconds for cost in costs))} for all pairs on one core; most for")
     kinematics = Kinematics.of(scene)
     for cost in costs[:COSTLIEST]:
         joints = len(kinematics.chain(*(scene.geometry(name).body for name in (cost.a, cost.b))))
         print(f"  {cost.a} and {cost.b}: {joints} joints between them, {output.seconds(cost.seconds)}")
-    return 1 if bad else 0
+    return 1 if broken else 0
 
 
 def _configuration(scene: Scene, args: Namespace) -> tuple[np.ndarray, str]:

@@ -90,7 +90,7 @@ def _add_scene(db: Database, room: Room, project: str, file: BinaryIO, stage: st
     besides = uncovered.document(scene)
     with db.write() as session:
         row = scenes.add(session, scene) if stage is None else staging.stage(session, stage, scene)
-        return SceneDetail.whole(row, scenes.names(session, [row.id])[row.id], besides)
+        return SceneDetail.whole(row, scenes.names(session, [row.id])[row.id], scene, besides)
 
 
 @cached(LRUCache(KEPT), key=lambda data: hashlib.sha256(data).digest(), lock=Lock())
@@ -114,7 +114,8 @@ def get_scene(scene_id: SceneGiven, db: Db) -> SceneDetail:
     with db.read() as session:
         row = scenes.get(session, scene_id)
         names = scenes.names(session, [row.id])[row.id]
-    return SceneDetail.whole(row, names, uncovered.document(scenes.load(db, row.id)))
+    scene = scenes.load(db, row.id)
+    return SceneDetail.whole(row, names, scene, uncovered.document(scene))
 
 
 @router.get("/{scene_id}/model")

@@ -158,13 +158,18 @@ class BeyondLimit(BaseModel):
 
 
 class Collision(BaseModel):
-    """Names a pair of bodies that touch."""
+    """Names a pair of bodies that touch, or says which condition is not kept."""
 
     where: str = Field(description="The field of the request, as `start` or `via[0]`.", examples=["start"])
     a: str = Field(description="The first geometry of the pair.")
     b: str = Field(description="The second geometry of the pair.")
     depth: float | None = Field(description="How deep the padded bodies are in each other, in metres; null where that is not known.")
     free: list[float] | None = Field(description="(n,), free joint positions near by; null where none were found.")
+    condition: str | None = Field(
+        default=None,
+        description="In words, which condition of the scene is not kept; null where two bodies touch.",
+        examples=["the condition 'upright' is not kept: the angle is 21.2 degrees, and 15 at most"],
+    )
 
 
 class Reached(BaseModel):

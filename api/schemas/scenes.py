@@ -5,10 +5,11 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Literal, Self
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from api.schemas.common import Document, Page
-from certifier.model import JointKind
+from certifier.conditions import of_condition
+from certifier.model import JointKind, Scene
 from certifier.verify.uncovered import LISTED
 from db.models import SceneRow
 
@@ -38,8 +39,8 @@ class SceneSummary(BaseModel):
             names=names,
             hash=row.hash,
             joints=len(document["q_star"]),
-            geometries=len(document["geometries"]),
-            pairs=len(document["pairs"]),
+            geometries=sum(not of_condition(geometry["name"]) for geometry in document["geometries"]),
+            pairs=sum(not any(map(of_condition, pair[:2])) for pair in document["pairs"]),
             warnings=len(document["warnings"]),
             created_at=row.created_at,
         )
@@ -84,6 +85,22 @@ class NotCovered(BaseModel):
     summary: str = Field(description="A sentence for people.", examples=["6 pairs of neighbouring links are not covered"])
 
 
+_STATEMENT = "the direction (0, 0, 1) of 'cup/cup' stays within 15 degrees of (0, 0, 1) of 'world'"
+
+
+class ConditionInfo(BaseModel):
+    """Describes what the scene asks for beside that no bodies touch. All proofs about the scene are about it as well."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"name": "upright", "kind": "cone", "statement": _STATEMENT}]})
+
+    name: str = Field(description="Its name.", examples=["upright"])
+    kind: str = Field(description="`cone`, `inside`, `distance` or `range`.", examples=["cone"])
+    statement: str = Field(
+        description="What holds, in words.",
+        examples=[_STATEMENT],
+    )
+
+
 class SceneDetail(SceneSummary):
     """Describes a scene with its joints, in position order."""
 
@@ -91,6 +108,7 @@ class SceneDetail(SceneSummary):
     bodies: list[str] = Field(description="Names of the bodies.")
     padding: float = Field(description="Metres added around both geometries of every pair that has no padding of its own.")
     not_covered: NotCovered = Field(description="The pairs of geometries that no proof about the scene is about.")
+    conditions: list[ConditionInfo] = Field(description="What holds beside collisions wherever something is proved.")
     configurations: dict[str, dict[str, float]] = Field(
         description="The named configurations: positions of joints by their names, in radians or metres. A request takes such names in the "
         "place of joint positions, with commas between them; `q_star` stands for q* of the joints that the others leave open.",
@@ -99,9 +117,9 @@ class SceneDetail(SceneSummary):
     provenance: Document = Field(description="What the scene was read from, and by which versions.")
 
     @classmethod
-    def whole(cls, row: SceneRow, names: list[str], not_covered: Document) -> Self:
+    def whole(cls, row: SceneRow, names: list[str], scene: Scene, not_covered: Document) -> Self:
         document = row.document
-        moving = sorted((j for j in document["joints"] if j["index"] is not None), key=lambda j: j["index"])
+        moving = sorted((j for j in document["joints"] if j["index"] is not None and not j.get("follows")), key=lambda j: j["index"])
         positions = [
             JointInfo(name=j["name"], kind=j["kind"], lower=j["lower"], upper=j["upper"], q_star=centre)
             for j, centre in zip(moving, document["q_star"], strict=True)
@@ -109,7 +127,8 @@ class SceneDetail(SceneSummary):
         return cls(
             **SceneSummary.of(row, names).model_dump(),
             positions=positions,
-            bodies=document["bodies"],
+            bodies=[body for body in document["bodies"] if not of_condition(body)],
+            conditions=[ConditionInfo(name=one.name, kind=one.kind, statement=str(one)) for one in scene.conditions],
             padding=document["padding"],
             configurations=document.get("configurations", {}),
             not_covered=NotCovered.model_validate(not_covered),

@@ -14,6 +14,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from certifier.conditioned import trouble
 from certifier.growth.actions import Certify, Finish, Outcomes, Transition
 from certifier.growth.obstacles import Obstacle, joined
 from certifier.growth.options import ENOUGH, MOST_CELLS
@@ -156,7 +157,7 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
         if copy is not None:
             return begin_stage(scene, state, copy, whole.kept, whole.passed, whole.stage)
         pair = scene.pairs[failing[0]]
-        reason = f"{pair.a} and {pair.b} touch, or come too close, at or between configurations that have to stay inside"
+        reason = f"{trouble(scene, pair)}, or nearly so, at or between configurations that have to stay inside"
         return _ended(state, report, reason)
     gone = {i for i in failing if not smaller.contains(report.weaknesses[i].points).all()} if smaller is not whole.polytope else set()
     cuts = whole.cuts | {i: whole.cuts.get(i, 0) + 1 for i in gone}

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
+from certifier.conditioned import without_conditions
 from certifier.errors import RegionError
 from certifier.growth.pairs import alike
 from certifier.jobs.parallel import side_by_side
@@ -102,7 +103,7 @@ def clearance(data: bytes, processes: int = 1, seed: int = 0) -> RegionClearance
         RegionError: ``no_pairs``.
     """
     proof, known = RegionProof.from_bytes(data), verify_region(data, processes).gap
-    scene, polytope = proof.scene, Polytope(proof.C, proof.d)
+    scene, polytope = without_conditions(proof.scene), Polytope(proof.C, proof.d)  # They are no distances between bodies.
     if not scene.pairs:
         raise RegionError("no_pairs", "the scene has no pair of bodies", field="PROOF", hint="add what the robot can collide with")
     distances = _Distances(scene)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from certifier.errors import ProofError
+from certifier.errors import ProofError, RegionError
 from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene
 from certifier.motion.given import motion_of
 from certifier.motion.padding import padding_of
@@ -107,7 +107,12 @@ def certify(scene: Scene, motion: Motion, tube: bool = False, padding: float = 0
 
     Raises:
         ProofError: the proof that was found does not hold; nothing is said then.
+        RegionError: has_conditions, for padding or a clearance in a scene with conditions.
     """
+    if scene.conditions and (padding or clearance):
+        field = "padding" if padding else "clearance"
+        hint = "leave it out, or ask about the scene without its conditions"
+        raise RegionError("has_conditions", f"{field} is about bodies, and this scene has conditions", field=field, hint=hint)
     start = time.perf_counter()
     found = search(scene, motion, tube, padding, clearance)
     searched = time.perf_counter()

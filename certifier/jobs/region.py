@@ -83,6 +83,7 @@ def certified_region(
     statement = last.statement if last is not None and last.proof == data else verify_region(data, processes, progress)
     ellipsoid = inscribed_ellipsoid(polytope)
     in_s = volume(polytope, seed=0)
+    between = statement.between_bodies  # What stands for a condition has no distance in metres.
     manifest = {
         "schema_version": SCHEMA_VERSION,
         "scene": {"name": scene.name, "hash": scene.hash, "directives": scene.provenance.get("directives")},
@@ -111,12 +112,14 @@ def certified_region(
                 "b": p.b,
                 "padding": scene.padding_of(p),
                 "outcome": "certified",
-                "proved_distance": statement.gaps[p],
-                "margin": statement.gaps[p],
+                "proved_distance": gap,
+                "margin": gap,
                 "proof_digest": digest(proofs[index]),
             }
             for index, p in enumerate(scene.pairs)
+            for gap in [between.get(p)]
         ],
+        "conditions": [{"name": one.name, "kind": one.kind, "statement": str(one)} for one in scene.conditions],
         "ignored": [{"a": i.a, "b": i.b, "reason": i.reason} for i in scene.ignored],
         "not_covered": uncovered.document(scene),
         "padding": scene.padding,

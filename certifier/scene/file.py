@@ -18,6 +18,7 @@ from certifier.configurations import Q_STAR, is_configuration_name
 from certifier.errors import SceneError
 from certifier.names import ALPHABET
 from certifier.scene import fields
+from certifier.scene.conditions import ConditionEntry, read_conditions
 from certifier.scene.directives import added_files, check_directives, replaced, resolved
 from certifier.scene.nodes import compose, decoded
 from certifier.scene.paddings import PaddedPair, Paddings
@@ -25,7 +26,7 @@ from certifier.scene.paths import beside
 
 KEYS = (
     *("name", "packages", "directives", "srdf", "q_star", "limits", "fix", "configurations", "padding", "ignore", "hulls"),
-    *("decompose", "mesh", "cylinder_sides", "xacro"),
+    *("decompose", "mesh", "cylinder_sides", "xacro", "conditions"),
 )
 """The keys of a scene file."""
 SWEPT = "swept"
@@ -72,6 +73,7 @@ class SceneFile:
         cylinder_sides: number of sides of the prism that stands for a cylinder.
         srdf: the SRDF file of a model, as written, by the model's name.
         configurations: positions by joint, or one for every joint, radians or metres, by the name of the configuration.
+        conditions: what has to hold beside that no pair touches.
     """
 
     path: Path
@@ -94,6 +96,7 @@ class SceneFile:
     xacro: dict[str, str | int | float | bool] = field(default_factory=dict)
     srdf: dict[str, str] = field(default_factory=dict)
     configurations: dict[str, dict[str, float] | tuple[float, ...]] = field(default_factory=dict)
+    conditions: tuple[ConditionEntry, ...] = ()
 
     @property
     def largest_padding(self) -> float:
@@ -146,6 +149,7 @@ def read_scene_file(path: Path) -> SceneFile:
         srdf=_srdf(values.get("srdf", {})),
         configurations=_configurations(values.get("configurations", {})),
         xacro=_arguments(values.get("xacro", {})),
+        conditions=read_conditions(values.get("conditions", [])),
     )
 
 

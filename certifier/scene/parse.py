@@ -42,12 +42,14 @@ from pydrake.multibody.tree import PrismaticJoint, QuaternionFloatingJoint, Revo
 from pydrake.solvers import MathematicalProgram
 from pydrake.systems.framework import DiagramBuilder
 
+from certifier.conditioned import with_conditions
 from certifier.errors import SceneError
 from certifier.model import Array, Geometry, Joint, JointKind, Scene
 from certifier.names import MAX_SENTENCE, escaped
 from certifier.positions import MAGNITUDE
 from certifier.scene import following, shapes
 from certifier.scene.census import check_counts
+from certifier.scene.conditions import condition
 from certifier.scene.configurations import own_configurations, srdf_configurations
 from certifier.scene.copies import Copies
 from certifier.scene.decomposition.parts import Decomposition
@@ -149,7 +151,8 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     drawn = {names.body(plant.GetBodyFromFrameId(inspector.GetFrameId(i))) for i in inspector.GetAllGeometryIds(Role.kIllustration)}
     states, left_out = srdf_configurations(scene, semantics, at, followers)
     files = {entry.reason: one.file for one in semantics for entry in one.ignore}
-    document = replace(scene, configurations=states | own_configurations(scene, scene_file.configurations)).to_document()
+    named = replace(scene, configurations=states | own_configurations(scene, scene_file.configurations))
+    document = with_conditions(named, [condition(entry, scene) for entry in scene_file.conditions]).to_document()
     document["warnings"] = (
         warnings
         + said_of(sweeps)

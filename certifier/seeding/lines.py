@@ -11,6 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
+from certifier.conditioned import trouble
 from certifier.errors import RegionError
 from certifier.model import Array, Pair, Scene
 from certifier.motion.intervals import RESOLUTION
@@ -48,7 +49,7 @@ def check_lines(scene: Scene, points: Array, ends: Sequence[Nearest]) -> list[Ne
             continue
         q = scene.to_q(motion.at(place.piece, place.time))
         if found.stop is not None and found.stop.outcome is Outcome.REFUTED:
-            message = f"{_touch(place.pair, q)}, on the straight line in s from {start} to this configuration"
+            message = f"{_touch(scene, place.pair, q)}, on the straight line in s from {start} to this configuration"
             hint = f"a region holds all of that line: leave one of its ends out, {_OR_COVER}"
             raise RegionError("contain_blocked", message, field=ends[j].field, hint=hint)
         near.append(Nearest(q, f"the line from {start} to {end}", place.distance, place.pair))
@@ -65,10 +66,10 @@ def _check_hull(scene: Scene, points: Array) -> None:
     """
     samples, contacts = np.random.default_rng(0).dirichlet(np.ones(len(points)), SAMPLES) @ points, Contacts(scene)
     for pair, found in contacts.touching(samples[~contacts.free(samples)]).items():
-        message = f"{_touch(pair, scene.to_q(found[0]))}, between the configurations that the region has to hold"
+        message = f"{_touch(scene, pair, scene.to_q(found[0]))}, between the configurations that the region has to hold"
         hint = f"a region holds all that is between them in s: leave one of them out, {_OR_COVER}"
         raise RegionError("contain_blocked", message, field="seed.contain", hint=hint)
 
 
-def _touch(pair: Pair, q: Array) -> str:
-    return f"{pair.a} and {pair.b} touch at q = {', '.join(f'{x:.9g}' for x in q)}"
+def _touch(scene: Scene, pair: Pair, q: Array) -> str:
+    return f"{trouble(scene, pair)} at q = {', '.join(f'{x:.9g}' for x in q)}"

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from certifier import stored
+from certifier.conditioned import tightened
 from certifier.errors import RegionError
 from certifier.isolation.telling import tell
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee
+from certifier.pair.collisions import in_collision
 from certifier.polytopes.polytope import chebyshev_center
 from certifier.seeding.arm import AT, NEAR, arm
 from certifier.seeding.free import Nearest, check_free
@@ -76,7 +78,7 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
             said = {}
         else:
             try:
-                C, d, said = best_of_tries(scene, points, replace(options, method=method))
+                C, d, said = best_of_tries(_to_propose(scene, points), points, replace(options, method=method))
             except RegionError:
                 _refuse_hindered(scene, checked)
                 raise
@@ -93,6 +95,12 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
     if known := hindrance(scene, checked):
         info["hindrance"] = known
     return Proposal(C, d, center, contain, info)
+
+
+def _to_propose(scene: Scene, points: Array) -> Scene:
+    """Returns the scene with tightened conditions, where points in s, (k, n), keep these."""
+    tight = tightened(scene)
+    return scene if tight is scene or in_collision(tight, points).any() else tight
 
 
 def _refuse_hindered(scene: Scene, checked: list[Nearest]) -> None:

@@ -14,6 +14,7 @@ from certifier.errors import ProofError
 from certifier.model import Scene
 from certifier.proof.map import MapProof
 from certifier.proof.partition import PLANE
+from certifier.verify.conditions import conditions
 from certifier.verify.paddings import paddings
 from certifier.verify.pair import check_ground, check_interior
 from certifier.verify.scene import check_scene, following
@@ -49,6 +50,7 @@ class MapStatement:
             *following(scene),
             f"a map of {self.cells} cells of the joint space within the joint limits; in each of them, a pair of bodies is apart",
             free,
+            *conditions(scene),
             *paddings(scene),
             *not_covered(scene),
             "guarantee: exact (rigorous arithmetic; the parsed model taken at its word)",

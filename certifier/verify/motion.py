@@ -25,6 +25,7 @@ from certifier.model import Array, Scene
 from certifier.proof import limits
 from certifier.proof.motion import Motion, MotionProof
 from certifier.verify.chains import UP, poses
+from certifier.verify.conditions import conditions
 from certifier.verify.decimals import exactly, rounded_down
 from certifier.verify.pieces import Pieces
 from certifier.verify.scene import check_scene, following
@@ -72,8 +73,9 @@ class MotionStatement:
             f"  from {motion.space.value} = {start}",
             f"  to {motion.space.value} = {end}",
             f"  SHA-256 of the {points} as doubles: {digest}",
-            f"{part} the padded bodies of each of the scene's {len(scene.pairs)} pairs are at least {rounded_down(self.gap)} m apart",
+            f"{part} the padded bodies of each of the scene's {len(scene.body_pairs)} pairs are at least {rounded_down(self.gap)} m apart",
             *([f"and {tube}, beyond the limits as well"] if self.rho else []),
+            *conditions(scene),
             *not_covered(scene),
         ]
 

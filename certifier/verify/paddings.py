@@ -10,7 +10,7 @@ from certifier.verify.decimals import exactly
 
 def paddings(scene: Scene) -> list[str]:
     """Returns lines that give the padding of a scene, and every pair with another one. One line stands for two bodies where it can."""
-    others = scene.other_paddings()
+    others = {pair: padding for pair, padding in scene.other_paddings().items() if pair in {*scene.body_pairs}}
     line = f"padding {exactly(scene.padding)} m around every body"
     if not others:
         return [line]
@@ -19,7 +19,7 @@ def paddings(scene: Scene) -> list[str]:
 
 def _lines(scene: Scene, others: dict[Pair, float]) -> Iterator[str]:
     of_bodies: dict[tuple[str, ...], list[Pair]] = {}
-    for pair in scene.pairs:
+    for pair in scene.body_pairs:
         bodies = sorted(scene.geometry(name).body for name in (pair.a, pair.b))
         of_bodies.setdefault(tuple(bodies), []).append(pair)
     for (a, b), pairs in of_bodies.items():

@@ -16,6 +16,7 @@ from certifier.proof.ground import Ground
 from certifier.proof.region import RegionProof
 from certifier.verify.archimedean import check_archimedean
 from certifier.verify.box import Halfspaces, limited, within_limits
+from certifier.verify.conditions import conditions
 from certifier.verify.decimals import exactly, rounded_down, rounded_up
 from certifier.verify.kinematics import exact
 from certifier.verify.paddings import paddings
@@ -42,8 +43,13 @@ class RegionStatement:
 
     @property
     def gap(self) -> float:
-        """Returns the least certified distance in metres over all pairs (0 when there is no pair)."""
-        return min(self.gaps.values(), default=0.0)
+        """Returns the least certified distance in metres over all pairs of bodies (0 when there is no pair)."""
+        return min(self.between_bodies.values(), default=0.0)
+
+    @property
+    def between_bodies(self) -> dict[Pair, float]:
+        """Returns the gaps of the pairs that prove no condition."""
+        return {pair: self.gaps[pair] for pair in self.scene.body_pairs}
 
     def lines(self) -> list[str]:
         """Returns the statement in plain words."""
@@ -52,14 +58,16 @@ class RegionStatement:
             f"  '{j.name}': {exactly(lower)} to {exactly(upper)} {j.unit} (centre {exactly(q)})"
             for j, lower, upper, q in zip(scene.moving, scene.q_lower, scene.q_upper, scene.q_star, strict=True)
         ]
-        closest = min(self.gaps, key=self.gaps.__getitem__, default=None)
+        gaps = self.between_bodies
+        closest = min(gaps, key=gaps.__getitem__, default=None)
         return [
             f"scene of hash {scene.hash}",
             f"{scene.n} {'joint' if scene.n == 1 else 'joints'}, within their limits:",
             *joints,
             *following(scene),
             f"a bounded, non-empty polytope of {self.faces} half-spaces in tangent space; |s|^2 <= {rounded_up(self.N, 6)}",
-            f"{len(self.gaps)} pairs of bodies separated at every configuration of it",
+            f"{len(gaps)} pairs of bodies separated at every configuration of it",
+            *conditions(scene),
             *paddings(scene),
             *([f"least distance, padded, at least {rounded_down(self.gap)} m: '{closest.a}' and '{closest.b}'"] if closest else []),
             *not_covered(scene),

@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from certifier.conditions import of_condition
 from certifier.errors import ProofError
 from certifier.model import WORLD, Joint, JointKind, Scene
 from certifier.names import escaped, is_name, is_sentence
 from certifier.proof import limits
+from certifier.verify.conditions import check_conditions
 from certifier.verify.kinematics import ExactKinematics, has_speed
 
 RIGID = 1e-9
@@ -35,11 +37,13 @@ def check_scene(scene: Scene) -> None:
     _check_bodies(scene)
     if scene.following:
         _check_no_position_twice(scene)
+    check_conditions(scene)
 
 
 def following(scene: Scene) -> list[str]:
-    """Returns a line for each joint that follows another one."""
-    return [f"  '{joint.name}' moves with '{scene.leader_of(joint).name}'{_how_far(joint)}" for joint in scene.following]
+    """Returns a line for each joint of the robot that follows another one."""
+    own = (joint for joint in scene.following if not of_condition(joint.name))
+    return [f"  '{joint.name}' moves with '{scene.leader_of(joint).name}'{_how_far(joint)}" for joint in own]
 
 
 def _how_far(joint: Joint) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from enum import StrEnum
 from typing import Any
 
+from certifier.conditions import of_condition
 from certifier.model import Scene
 
 NAMED = 20
@@ -107,12 +108,12 @@ class _Geometries:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self.body = {geometry.name: geometry.body for geometry in scene.geometries}
+        self.body = {geometry.name: geometry.body for geometry in scene.geometries if not of_condition(geometry.name)}
         self._held = Counter(self.body.values())
         self._parts: dict[str, list[str]] = {}
         for name in sorted(self._held):
             self._parts.setdefault(_rigid_part(scene, name), []).append(name)
-        pairs = {frozenset((p.a, p.b)) for p in scene.pairs} | {frozenset((i.a, i.b)) for i in scene.ignored}
+        pairs = {frozenset((p.a, p.b)) for p in scene.body_pairs} | {frozenset((i.a, i.b)) for i in scene.ignored}
         self._listed = Counter(frozenset(map(self.body.__getitem__, names)) for names in pairs)
 
     def missing(self) -> Iterator[tuple[str, str, int]]:
@@ -121,7 +122,7 @@ class _Geometries:
 
     def neighbours(self) -> list[tuple[str, str, int]]:
         """Returns those of the missing ones whose bodies a joint joins."""
-        joined = (joint for joint in self._scene.joints if joint.index is not None)
+        joined = (joint for joint in self._scene.joints if joint.index is not None and not of_condition(joint.child))
         return list(self._missing(sorted((joint.parent, joint.child)) for joint in joined))
 
     def missing_altogether(self) -> int:

@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
+from certifier.conditions import of_condition
 from certifier.errors import RegionError, close_matches
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Scene
@@ -122,9 +123,10 @@ def _three(given: ArrayLike, field: str) -> Array:
 
 def _body(scene: Scene, name: str) -> str:
     """Returns the body that is meant by its name, or by the last part of it."""
-    if name in scene.bodies:
+    bodies = [body for body in scene.bodies if not of_condition(body)]
+    if name in bodies:
         return name
-    found = [body for body in scene.bodies if body.endswith(f"/{name}")]
+    found = [body for body in bodies if body.endswith(f"/{name}")]
     if len(found) == 1:
         return found[0]
     if found:
@@ -137,7 +139,7 @@ def _body(scene: Scene, name: str) -> str:
 def _moved(scene: Scene) -> list[str]:
     """Returns the bodies that joints move, those farthest from the world first, for they are the likeliest tools."""
     kinematics = Kinematics.of(scene)
-    moved = [body for body in scene.bodies if body != "world" and kinematics.chain("world", body)]
+    moved = [body for body in scene.bodies if body != "world" and not of_condition(body) and kinematics.chain("world", body)]
     return sorted(moved, key=lambda body: -len(kinematics.ancestors(body)))
 
 

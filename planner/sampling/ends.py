@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from certifier.conditioned import condition_of, trouble
 from certifier.model import Array, Scene
 from certifier.seeding.free import ROOM, Clearance, nearest_free
 
@@ -27,18 +28,20 @@ class OutsideLimits:
 
 @dataclass(frozen=True, eq=False)
 class InCollision:
-    """Two bodies touch.
+    """Two bodies touch, or a condition is not kept.
 
     Attributes:
         a, b: the geometries.
         depth: how deep the padded bodies are in each other, metres; None where Drake cannot tell.
         free: (n,) the nearest free joint positions that were found; None where none were.
+        condition: in words, which condition is not kept, if the two geometries stand for one.
     """
 
     a: str
     b: str
     depth: float | None
     free: Array | None
+    condition: str | None = None
 
 
 def outside_limits(scene: Scene, q: Array) -> OutsideLimits | None:
@@ -57,7 +60,8 @@ def in_collision(scene: Scene, q: Array) -> InCollision:
     distance, pair = clearance.least(q)
     searched = (nearest_free(scene, clearance, scene.in_windows(q), room) for room in ROOM)
     free = next((found for found in searched if found is not None), None)
-    return InCollision(pair.a, pair.b, -distance if np.isfinite(distance) else None, free)
+    broken = None if condition_of(scene, pair) is None else trouble(scene, pair, distance)
+    return InCollision(pair.a, pair.b, -distance if np.isfinite(distance) else None, free, broken)
 
 
 def turned(scene: Scene, start: Array, goal: Array) -> list[Array]:

@@ -91,7 +91,7 @@ def small_region() -> bytes:
     return certified_region(scene, accepted(polytope, np.zeros(1)), proofs, {"seconds": 1.0}).proof
 
 
-UNCOVERED = {"not_covered", "not_covered_pairs", "not_covered_why", "not_covered_summary"}
+UNCOVERED = {"not_covered", "not_covered_pairs", "not_covered_why", "not_covered_summary", "conditions"}
 SUMMARY = "1 pair of neighbouring links is not covered"
 
 
@@ -117,6 +117,7 @@ def test_what_a_region_does_not_cover_is_said_wherever_it_is_told_of(
         "not_covered_pairs": [1],
         "not_covered_why": ["neighbours"],
         "not_covered_summary": SUMMARY,
+        "conditions": [],
     }
     assert f"# {SUMMARY}\n#   1 of arm/link1 and arm/link2: neighbours\n" in files["drake-yaml"].decode()
     statement = client.post(f"/v1/regions/{planar_region}/verify").json()["statement"]

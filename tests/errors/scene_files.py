@@ -41,6 +41,18 @@ SCENE_FILES: Table = {
         lambda t: t.load(D.replace("}}", "}}, " + WELD.format("rotation: !AngleAxis {angle_deg: 1, axis: [0, 0, 0]}"))),
         lambda t: t.load(D.replace("}}", "}}, " + WELD.format("translation: [.nan, 0, 0]"))),
     ],
+    ("scene_field", "conditions"): [lambda t: t.load(D + "conditions: {a: 1}\n")],
+    ("scene_field", "conditions[0]"): [
+        lambda t: t.load(D + "conditions: [3]\n"),
+        lambda t: t.load(D + "conditions: [{name: up}]\n"),
+        lambda t: t.load(D + "conditions: [{name: up, cone: {}, range: {}}]\n"),
+    ],
+    ("scene_field", "conditions[0].name"): [lambda t: t.load(D + "conditions: [{cone: {}}]\n")],
+    ("scene_field", "conditions[1].name"): [
+        lambda t: t.load(D + "conditions: [{name: up, distance: {}}, {name: up, distance: {}}]\n"),
+    ],
+    ("scene_field", "conditions[0].cone"): [lambda t: t.load(D + "conditions: [{name: up, cone: 3}]\n")],
+    ("scene_field", "conditions[0].cone.angle"): [lambda t: t.load(D + "conditions: [{name: up, cone: {angle: 3}}]\n")],
     ("scene_field", "mesh.mode"): [lambda t: t.load(D + "mesh: {mode: raw}\n")],
     ("scene_field", "fix.grip"): [lambda t: t.load(D + "fix: {grip: 0, grip: 1}\n"), lambda t: t.load(D + "fix: {grip: open}\n")],
     ("scene_field", "padding.bodies"): [lambda t: t.load(D + "padding: {bodies: [a]}\n")],

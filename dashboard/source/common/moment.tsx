@@ -78,16 +78,25 @@ export function touchingOf(model: SceneModel, moment: Moment): number[] {
   return [...new Set((moment.pairs ?? []).flatMap((pair) => model.pairs[pair] ?? []))];
 }
 
+/** Whether a geometry stands for a condition of the scene. */
+function ofCondition(name: string): boolean {
+  return name.startsWith("conditions/");
+}
+
 /** Says in words what is known of the configuration, and how surely. */
 export function MomentText({ model, moment }: { model: SceneModel; moment: Moment }) {
   const { pairs, outside, regions, motions, map, nearest, problem } = moment;
-  const names = (pairs ?? []).map((pair) => model.pairs[pair]!.map((i) => model.geometries[i]!.name).join(" and "));
+  const both = (pairs ?? []).map((pair) => model.pairs[pair]!.map((i) => model.geometries[i]!.name));
+  const names = both.filter((two) => !two.some(ofCondition)).map((two) => two.join(" and "));
+  const broken = [...new Set(both.flatMap((two) => two.filter(ofCondition).slice(0, 1)).map((name) => name.split("/")[1]!))];
   return (
     <p class="said" role="status">
       {problem ? <span class="bad">{problem}</span> : pairs === undefined ? "…" : outside.length ? (
         <span class="bad">Outside of the limits: {outside.join(", ")}.</span>
       ) : pairs === null ? "Not known here: a joint is half a turn away from q*." : names.length ? (
         <span class="bad">In collision: {names.slice(0, 3).join("; ")}{names.length > 3 && `; and ${names.length - 3} more pairs`}.</span>
+      ) : broken.length ? (
+        <span class="bad">Not kept: the condition{broken.length > 1 && "s"} {broken.join(", ")}.</span>
       ) : regions.length ? (
         <span class="good">In {regions.length === 1 ? "a certified region" : `${regions.length} certified regions`}: {regions.slice(0, 4).map((region, i) => <>{i > 0 && ", "}<a href={`/regions/${region}`} key={region}>{region.slice(0, 8)}</a></>)}. No collision of the scene's pairs, as proved.</span>
       ) : motions.length ? (

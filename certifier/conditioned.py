@@ -1,0 +1,328 @@
+"""Conditions become pairs of geometries here, so that whatever proves pairs apart proves conditions.
+
+A cone is about directions. The joints that turn the body are copied without their offsets, each moving with the one that it copies. A ball
+at the end of the direction has to stay out of the box of all directions that are too far away. A range of angles is a cone of a chain
+that turns in a plane. Outside of each face of a zone there is a box as large as the geometries reach. A distance is padding.
+
+All numbers are rounded to the safe side by ROOM: two geometries are apart only if the condition holds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from certifier.conditions import MODEL, Condition, Cone, Distance, Inside, Range, of_condition
+from certifier.errors import SceneError
+from certifier.model import WORLD, Array, Geometry, Joint, JointKind, Pair, Scene
+from certifier.names import is_name
+from certifier.positions import MAGNITUDE
+
+ROOM = 1e-9
+"""A face is moved by this to the safe side, in metres, and in cosines of angles. It is far above what doubles round."""
+BALL = 0.01
+"""Radius of the ball at the end of a direction, which is 1 long."""
+LONG = 2.0
+"""How far the box of the directions that are too far away extends beyond the sphere of directions."""
+TIGHT = 14 / 15
+"""Proposals are made for cones and ranges that are narrower by this factor (docs/trials.md)."""
+LEAST_ANGLE = math.radians(0.1)
+"""A cone is no narrower than this, so that ROOM does not matter."""
+MOST_FACES = 100
+"""A zone has at most this many faces."""
+UNIT = 1e-9
+"""The length of a direction differs from 1 by less than this."""
+TURNING = "turning"
+"""No condition has this name, which copies of bodies have that only turn."""
+CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+
+
+def with_conditions(scene: Scene, conditions: Sequence[Condition]) -> Scene:
+    """Returns the scene with conditions, and with the pairs that prove them.
+
+    Args:
+        scene: has no conditions.
+
+    Raises:
+        SceneError: ``condition``, for one that concerns nothing that moves, or that a pair without a certificate would have to prove.
+    """
+    parts = _Parts(scene)
+    for condition in conditions:
+        check(scene, condition)
+        parts.add(condition)
+    if len({condition.name for condition in conditions}) < len(conditions):
+        raise SceneError("condition", "two conditions have one name", field="conditions", hint="give each its own name")
+    return replace(
+        scene,
+        joints=(*scene.joints, *parts.joints),
+        bodies=(*scene.bodies, *(joint.child for joint in parts.joints)),
+        geometries=(*scene.geometries, *parts.geometries),
+        pairs=(*parts.padded, *parts.pairs),
+        conditions=tuple(conditions),
+    )
+
+
+def check(scene: Scene, condition: Condition) -> None:
+    """Checks that a condition makes sense in a scene.
+
+    Raises:
+        SceneError: ``condition``.
+    """
+    if not is_name(condition.name) or "/" in condition.name or condition.name == TURNING:
+        raise _wrong(condition, "it needs a name without a slash")
+    match condition:
+        case Cone():
+            _check_bodies(scene, condition, condition.body, condition.of)
+            _check_vectors(condition, condition.axis, condition.along)
+            if not LEAST_ANGLE <= condition.angle <= math.pi - LEAST_ANGLE:
+                raise _wrong(condition, "its angle has to be between 0.1 and 179.9 degrees")
+        case Inside():
+            _check_bodies(scene, condition, condition.of)
+            if not condition.geometries or not all(map(scene.has_geometry, condition.geometries)):
+                raise _wrong(condition, "it has to name geometries of the scene")
+            if not condition.faces or len(condition.faces) > MOST_FACES:
+                raise _wrong(condition, f"its zone needs 1 to {MOST_FACES} faces")
+            _check_vectors(condition, *(face[:3] for face in condition.faces))
+        case Distance():
+            if not 0 < condition.metres <= MAGNITUDE:
+                raise _wrong(condition, "its distance has to be positive")
+        case Range():
+            names, known = [joint for joint, _ in condition.joints], {j.name for j in scene.moving if j.kind is JointKind.REVOLUTE}
+            if not names or len(set(names)) < len(names) or not {*names} <= known:
+                raise _wrong(condition, "it has to name joints that turn and have positions of their own, each once")
+            if not 2 * LEAST_ANGLE <= condition.upper - condition.lower <= 2 * (math.pi - LEAST_ANGLE):
+                raise _wrong(condition, "its angles have to be 0.2 to 359.8 degrees apart")
+
+
+def _check_bodies(scene: Scene, condition: Condition, *bodies: str) -> None:
+    for body in bodies:
+        if body not in scene.bodies:
+            raise _wrong(condition, f"{body} is no body of the scene")
+
+
+def _check_vectors(condition: Condition, *vectors: Sequence[float]) -> None:
+    for vector in vectors:
+        if not abs(float(np.linalg.norm(vector)) - 1) < UNIT:
+            raise _wrong(condition, "a direction is no unit vector")
+
+
+def without_conditions(scene: Scene) -> Scene:
+    """Returns the scene without conditions, and without what stands for them. Paddings of distances remain."""
+    return replace(
+        scene,
+        joints=tuple(joint for joint in scene.joints if not of_condition(joint.child)),
+        bodies=tuple(body for body in scene.bodies if not of_condition(body)),
+        geometries=tuple(geometry for geometry in scene.geometries if not of_condition(geometry.name)),
+        pairs=tuple(pair for pair in scene.pairs if not (of_condition(pair.a) or of_condition(pair.b))),
+        conditions=(),
+    )
+
+
+def tightened(scene: Scene) -> Scene:
+    """Returns the scene with narrower cones and ranges.
+
+    A proposal of such a scene has faces that do not touch the conditions of the scene itself. Where they touch, proofs need many cells.
+    """
+    narrower = [_tightened(condition) for condition in scene.conditions]
+    return scene if narrower == list(scene.conditions) else with_conditions(without_conditions(scene), narrower)
+
+
+def _tightened(condition: Condition) -> Condition:
+    match condition:
+        case Cone():
+            return replace(condition, angle=max(TIGHT * condition.angle, LEAST_ANGLE))
+        case Range():
+            less = (1 - TIGHT) * (condition.upper - condition.lower) / 2
+            return replace(condition, lower=condition.lower + less, upper=condition.upper - less)
+    return condition
+
+
+def condition_of(scene: Scene, pair: Pair) -> Condition | None:
+    """Returns the condition that a pair proves; None for a pair of bodies that are to stay apart."""
+    name = next((name.split("/")[1] for name in (pair.a, pair.b) if of_condition(name)), None)
+    return next((condition for condition in scene.conditions if condition.name == name), None)
+
+
+def trouble(scene: Scene, pair: Pair, distance: float | None = None) -> str:
+    """Returns in words that a pair touches, or that the condition that it proves is not kept.
+
+    Args:
+        distance: of the two geometries, in metres, where it is known; negative where they overlap. Of a cone it is a difference of cosines.
+    """
+    condition = condition_of(scene, pair)
+    if condition is None:
+        return f"{pair.a} and {pair.b} touch"
+    by = ""
+    if distance is not None and math.isfinite(distance):
+        match condition:
+            case Cone():
+                angle = math.degrees(math.acos(max(math.cos(condition.angle) + min(distance, 0.0), -1.0)))
+                by = f": the angle is {angle:.3g} degrees, and {math.degrees(condition.angle):.9g} at most"
+            case Range():
+                half = (condition.upper - condition.lower) / 2
+                beyond = math.degrees(math.acos(max(math.cos(half) + min(distance, 0.0), -1.0)) - half)
+                by = f": the sum of the angles is {beyond:.3g} degrees beyond its range"
+            case _:
+                geometry = next(name for name in (pair.a, pair.b) if not of_condition(name))
+                by = f": {geometry} reaches {-1000 * min(distance, 0.0):.3g} mm beyond the zone"
+    return f"the condition '{condition.name}' is not kept{by}"
+
+
+@dataclass
+class _Parts:
+    """Gathers what stands for the conditions of a scene."""
+
+    scene: Scene
+    joints: list[Joint] = field(default_factory=list)
+    geometries: list[Geometry] = field(default_factory=list)
+    pairs: list[Pair] = field(default_factory=list)
+    padded: list[Pair] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.padded = list(self.scene.pairs)
+        self._copies: dict[str, str] = {WORLD: WORLD}
+
+    def add(self, condition: Condition) -> None:
+        match condition:
+            case Cone():
+                self._cone(condition, self._turning(condition.body), condition.axis, self._turning(condition.of), condition.along)
+            case Inside():
+                self._inside(condition)
+            case Distance():
+                self._distance(condition)
+            case Range():
+                self._range(condition)
+
+    def _cone(self, condition: Cone | Range, body: str, axis: Sequence[float], of: str, along: Sequence[float]) -> None:
+        angle = condition.angle if isinstance(condition, Cone) else (condition.upper - condition.lower) / 2
+        if not _moves(self.joints, body, of):
+            raise _wrong(condition, "no joint turns the one direction against the other")
+        top = math.cos(angle) + ROOM - BALL
+        beyond = _slab(np.array(along), top, -LONG - top, LONG)
+        ball = np.array([_unit(axis)])
+        self._pair(condition, body, "direction", ball, BALL, of, "beyond", beyond)
+
+    def _turning(self, body: str) -> str:
+        """Returns the copy of a body that turns as the body does, but never moves: its joints have no offsets."""
+        if body not in self._copies:
+            joint = self.scene.joint_above[body]
+            parent, copy = self._turning(joint.parent), f"{MODEL}/{TURNING}/{body}"
+            X_PF, X_BM = _turned(joint.X_PF), _turned(joint.X_BM)
+            if joint.kind is JointKind.REVOLUTE:
+                copied = replace(joint, name=copy, parent=parent, child=copy, X_PF=X_PF, X_BM=X_BM, follows=True)
+            else:
+                copied = Joint(copy, JointKind.WELD, parent, copy, np.zeros(3), X_PF, X_BM)
+            self.joints.append(copied)
+            self._copies[body] = copy
+        return self._copies[body]
+
+    def _range(self, condition: Range) -> None:
+        moving = {joint.name: joint for joint in self.scene.moving}
+        parent = WORLD
+        for i, (name, sign) in enumerate(condition.joints):
+            leader, child = moving[name], f"{MODEL}/{condition.name}/turn{i}"
+            axis = np.array([0.0, 0.0, float(sign)])
+            turn = replace(leader, name=child, parent=parent, child=child, axis=axis, X_PF=np.eye(4), X_BM=np.eye(4), follows=True)
+            self.joints.append(turn)
+            parent = child
+        middle = (condition.lower + condition.upper) / 2
+        self._cone(condition, parent, (1.0, 0.0, 0.0), WORLD, (math.cos(middle), math.sin(middle), 0.0))
+
+    def _inside(self, condition: Inside) -> None:
+        scene, frame = self.scene, f"{MODEL}/{condition.name}/zone"
+        self.joints.append(Joint(frame, JointKind.WELD, condition.of, frame, np.zeros(3), np.eye(4), np.eye(4)))
+        geometries = [scene.geometry(name) for name in condition.geometries]
+        for geometry in geometries:
+            if not _moves(scene.joints, geometry.body, condition.of):
+                raise _wrong(condition, f"{geometry.name} does not move against {condition.of}")
+        reach = max(_reach(scene, geometry, condition.of) for geometry in geometries)
+        for i, (*normal, offset) in enumerate(condition.faces):
+            if offset >= reach:
+                continue  # No geometry reaches this face.
+            name = f"{MODEL}/{condition.name}/face{i}"
+            vertices = _slab(np.array(normal), offset - ROOM, reach - offset + 2 * ROOM, reach)
+            self.geometries.append(Geometry(name, frame, vertices, 0.0, {"kind": "condition"}))
+            self.pairs += [Pair(*sorted((name, geometry.name)), padding=0.0) for geometry in geometries]
+
+    def _distance(self, condition: Distance) -> None:
+        scene = self.scene
+        sides = [{g.name for g in scene.geometries if name in (g.name, g.body)} for name in (condition.a, condition.b)]
+        between = {frozenset((a, b)) for a in sides[0] for b in sides[1]}
+        kept = {frozenset((pair.a, pair.b)) for pair in scene.pairs}
+        missing = next(iter(sorted(tuple(sorted(names)) for names in between - kept)), None)
+        if missing is not None or not between:
+            what = " and ".join(missing) if missing else f"{condition.a} and {condition.b}"
+            raise _wrong(condition, f"the scene does not certify {what} against each other")
+        each = condition.metres / 2 * (1 + ROOM)
+        self.padded = [
+            replace(pair, padding=max(each, pair.padding if pair.padding is not None else scene.padding))
+            if frozenset((pair.a, pair.b)) in between
+            else pair
+            for pair in self.padded
+        ]
+
+    def _pair(
+        self, condition: Condition, body: str, what: str, vertices: Array, radius: float, other: str, against: str, others: Array
+    ) -> None:
+        names = [f"{MODEL}/{condition.name}/{one}" for one in (what, against)]
+        shape = {"kind": "condition"}
+        self.geometries += [Geometry(names[0], body, vertices, radius, shape), Geometry(names[1], other, others, 0.0, shape)]
+        self.pairs.append(Pair(*sorted(names), padding=0.0))
+
+
+def _slab(normal: Array, begin: float, depth: float, lateral: float) -> Array:
+    """Returns the corners, (8, 3), of the box from ``begin`` along a direction on, as deep as ``depth``, and ``lateral`` to all sides."""
+    normal = _unit(normal)
+    across = np.linalg.svd(normal[None])[2][1:]
+    x, y, z = CORNERS.T
+    return np.outer(begin + depth * x, normal) + lateral * (np.outer(y, across[0]) + np.outer(z, across[1]))
+
+
+def _unit(vector: Iterable[float]) -> Array:
+    array = np.array(list(vector), dtype=float)
+    return np.asarray(array / np.linalg.norm(array))
+
+
+def _turned(X: Array) -> Array:
+    """Returns a pose without its offset."""
+    found = np.eye(4)
+    found[:3, :3] = X[:3, :3]
+    return found
+
+
+def _path(joints: Iterable[Joint], body: str, of: str) -> list[Joint]:
+    """Returns the joints between two bodies."""
+    above = {joint.child: joint for joint in joints}
+
+    def ways(start: str) -> list[Joint]:
+        found = []
+        while start in above:
+            found.append(above[start])
+            start = above[start].parent
+        return found
+
+    one, other = ways(body), ways(of)
+    while one and other and one[-1] is other[-1]:
+        one.pop()
+        other.pop()
+    return one + other
+
+
+def _moves(joints: Iterable[Joint], body: str, of: str) -> bool:
+    return any(joint.index is not None for joint in _path(joints, body, of))
+
+
+def _reach(scene: Scene, geometry: Geometry, of: str) -> float:
+    """Returns a distance in metres from a body's origin that no point of a geometry exceeds, as certifier.scene.tree.Tree.reach."""
+    total = float(np.linalg.norm(geometry.vertices, axis=1).max()) + geometry.radius
+    for joint in _path(scene.joints, geometry.body, of):
+        slide = max(abs(joint.lower or 0.0), abs(joint.upper or 0.0)) * joint.speed
+        total += float(np.linalg.norm(joint.X_PF[:3, 3])) + slide + float(np.linalg.norm(joint.X_BM[:3, 3]))
+    return total * (1 + ROOM) + ROOM
+
+
+def _wrong(condition: Condition, problem: str) -> SceneError:
+    return SceneError("condition", f"{condition.name}: {problem}", field="conditions", hint="docs/conditions.md says what conditions need")

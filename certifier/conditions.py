@@ -1,0 +1,176 @@
+"""Conditions beside collisions: what else has to hold at every configuration that is proved, such as a tool that stays upright.
+
+This module has the data alone. :mod:`certifier.conditioned` says which pairs of geometries prove a condition.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+if TYPE_CHECKING:  # The command reads scene files without numpy, which documents need.
+    from certifier.document import Node
+
+MODEL = "conditions"
+"""Bodies and geometries that stand for conditions have names that begin with this and a slash."""
+
+Vector = tuple[float, float, float]
+
+
+def of_condition(name: str) -> bool:
+    """Says whether a joint, a body or a geometry stands for a condition, by its name."""
+    return name.startswith(f"{MODEL}/")
+
+
+@dataclass(frozen=True)
+class Cone:
+    """A direction of a body stays within an angle of a direction of another body, or of the world.
+
+    Attributes:
+        axis: the direction in the frame of ``body``; a unit vector, as far as doubles go.
+        along: the other direction, in the frame of ``of``, likewise.
+        angle: radians, above 0 and below pi.
+    """
+
+    name: str
+    body: str
+    axis: Vector
+    of: str
+    along: Vector
+    angle: float
+    kind: ClassVar = "cone"
+
+    def __str__(self) -> str:
+        angle = f"{math.degrees(self.angle):.9g} degrees"
+        return f"the direction {_shown(self.axis)} of '{self.body}' stays within {angle} of {_shown(self.along)} of '{self.of}'"
+
+
+@dataclass(frozen=True)
+class Inside:
+    """Geometries stay in a convex zone. The padding of the scene does not count for it.
+
+    Attributes:
+        geometries: their names.
+        of: the body in whose frame the zone is, or the world.
+        faces: the zone has x . (a, b, c) <= d for each (a, b, c, d), in metres; (a, b, c) is a unit vector, as far as doubles go.
+    """
+
+    name: str
+    geometries: tuple[str, ...]
+    of: str
+    faces: tuple[tuple[float, float, float, float], ...]
+    kind: ClassVar = "inside"
+
+    def __str__(self) -> str:
+        faces = ", ".join(f"{_shown(normal)} . x <= {d:.9g} m" for *normal, d in self.faces)
+        return f"{', '.join(repr(name) for name in self.geometries)} stay where {faces}, in the frame of '{self.of}'"
+
+
+@dataclass(frozen=True)
+class Distance:
+    """Two bodies, or geometries, keep a distance in metres."""
+
+    name: str
+    a: str
+    b: str
+    metres: float
+    kind: ClassVar = "distance"
+
+    def __str__(self) -> str:
+        return f"'{self.a}' and '{self.b}' stay at least {self.metres:.9g} m apart"
+
+
+@dataclass(frozen=True)
+class Range:
+    """The sum of the angles of joints, each with its sign, stays between two angles, but for whole turns.
+
+    Attributes:
+        joints: the joints, and 1 or -1 for each.
+        lower, upper: radians, less than a whole turn apart.
+    """
+
+    name: str
+    joints: tuple[tuple[str, int], ...]
+    lower: float
+    upper: float
+    kind: ClassVar = "range"
+
+    def __str__(self) -> str:
+        total = " ".join(f"{'+' if sign > 0 else '-'} '{joint}'" for joint, sign in self.joints).removeprefix("+ ")
+        return f"{total} stays from {math.degrees(self.lower):.9g} to {math.degrees(self.upper):.9g} degrees, but for whole turns"
+
+
+Condition = Cone | Inside | Distance | Range
+_READ: dict[str, tuple[tuple[str, ...], Callable[[dict[str, Node]], Condition]]] = {
+    Cone.kind: (
+        ("name", "body", "axis", "of", "along", "angle"),
+        lambda f: Cone(_text(f, "name"), _text(f, "body"), _vector(f["axis"]), _text(f, "of"), _vector(f["along"]), _number(f["angle"])),
+    ),
+    Inside.kind: (
+        ("name", "geometries", "of", "faces"),
+        lambda f: Inside(_text(f, "name"), tuple(one.text() for one in f["geometries"].items()), _text(f, "of"), _faces(f["faces"])),
+    ),
+    Distance.kind: (
+        ("name", "a", "b", "metres"),
+        lambda f: Distance(_text(f, "name"), _text(f, "a"), _text(f, "b"), _number(f["metres"])),
+    ),
+    Range.kind: (
+        ("name", "joints", "lower", "upper"),
+        lambda f: Range(_text(f, "name"), _signed(f["joints"]), _number(f["lower"]), _number(f["upper"])),
+    ),
+}
+
+
+def to_document(condition: Condition) -> dict[str, Any]:
+    """Returns a condition as JSON-able data."""
+    return {"kind": condition.kind, **{name: _plain(value) for name, value in asdict(condition).items()}}
+
+
+def from_document(node: Node) -> Condition:
+    """Returns the condition that :func:`to_document` has described.
+
+    Raises:
+        CirisError: document.
+    """
+    kind = node.value.get("kind") if isinstance(node.value, dict) else None
+    if kind not in _READ:
+        node.refuse(f"a condition, whose kind is one of {', '.join(_READ)}")
+    fields, read = _READ[kind]
+    return read(node.fields("kind", *fields))
+
+
+def _plain(value: Any) -> Any:
+    return [_plain(one) for one in value] if isinstance(value, tuple) else value
+
+
+def _shown(vector: Iterable[float]) -> str:
+    return f"({', '.join(f'{x + 0.0:.9g}' for x in vector)})"
+
+
+def _text(fields: dict[str, Node], name: str) -> str:
+    return fields[name].text()
+
+
+def _number(node: Node) -> float:
+    return float(node.number())
+
+
+def _vector(node: Node) -> Vector:
+    x, y, z = node.array(3).tolist()
+    return x, y, z
+
+
+def _faces(node: Node) -> tuple[tuple[float, float, float, float], ...]:
+    return tuple(tuple(face) for face in node.array(None, 4).tolist())
+
+
+def _signed(node: Node) -> tuple[tuple[str, int], ...]:
+    found = []
+    for one in node.items():
+        joint, sign = one.two()
+        if sign.value not in (1, -1):
+            sign.refuse("1 or -1")
+        found.append((joint.text(), int(sign.value)))
+    return tuple(found)

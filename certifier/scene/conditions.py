@@ -1,0 +1,169 @@
+"""What a scene file says of conditions is read here, and becomes conditions of its scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from certifier.conditions import Condition, Cone, Distance, Inside, Range
+from certifier.errors import SceneError
+from certifier.scene import fields
+from certifier.scene.known import check_known, names_of
+
+if TYPE_CHECKING:  # The command reads scene files without numpy, which the model needs.
+    from certifier.model import Scene
+
+WORLD = "world"
+KEYS: Mapping[str, tuple[str, ...]] = {
+    Cone.kind: ("body", "axis", "along", "of", "degrees"),
+    Inside.kind: ("what", "of", "box", "half_spaces"),
+    Distance.kind: ("between", "metres"),
+    Range.kind: ("joints", "degrees"),
+}
+"""The kinds of conditions, and what each is about."""
+
+
+@dataclass(frozen=True)
+class ConditionEntry:
+    """Holds what a scene file says of a condition, by the keys of its kind; ``field`` is where."""
+
+    name: str
+    kind: str
+    said: Mapping[str, Any]
+    field: str
+
+
+def read_conditions(value: Any) -> tuple[ConditionEntry, ...]:
+    """Returns the conditions of a scene file, whose names of bodies and joints nobody has looked up yet.
+
+    Raises:
+        SceneError: ``scene_field``.
+    """
+    if not isinstance(value, list):
+        raise fields.wrong("conditions", "must be a list of conditions, each with a name and one of " + ", ".join(KEYS))
+    found: list[ConditionEntry] = []
+    for i, entry in enumerate(value):
+        where = f"conditions[{i}]"
+        given = fields.section(entry, where, ("name", *KEYS))
+        if "name" not in given:
+            raise fields.wrong(f"{where}.name", "is missing", hint="give each condition a name, which statements use")
+        name = fields.name(given["name"], f"{where}.name")
+        kinds = [kind for kind in KEYS if kind in given]
+        if len(kinds) != 1:
+            raise fields.wrong(where, f"must have one of {', '.join(KEYS)}")
+        if name in {one.name for one in found}:
+            raise fields.wrong(f"{where}.name", f"{name} is the name of another condition", hint="give each its own name")
+        place = f"{where}.{kinds[0]}"
+        found.append(ConditionEntry(name, kinds[0], fields.section(given[kinds[0]], place, KEYS[kinds[0]]), place))
+    return tuple(found)
+
+
+def condition(entry: ConditionEntry, scene: Scene) -> Condition:
+    """Returns the condition that an entry describes.
+
+    Raises:
+        SceneError: ``scene_field``; ``unknown_name``, for a body, a geometry or a joint that the scene does not have.
+    """
+    said, where = entry.said, entry.field
+    match entry.kind:
+        case Cone.kind:
+            axis, along = (_direction(said.get(key), f"{where}.{key}") for key in ("axis", "along"))
+            angle = math.radians(fields.number(said.get("degrees"), f"{where}.degrees", minimum=0.0))
+            body, of = _body(said.get("body"), f"{where}.body", scene), _body(said.get("of", WORLD), f"{where}.of", scene)
+            return Cone(entry.name, body, axis, of, along, angle)
+        case Inside.kind:
+            what = said.get("what")
+            if not isinstance(what, list) or not what:
+                raise fields.wrong(f"{where}.what", "must be a list of bodies or geometries, such as [arm/hand]")
+            of = _body(said.get("of", WORLD), f"{where}.of", scene)
+            named = [name for i, one in enumerate(what) for name in _geometries(one, f"{where}.what[{i}]", scene)]
+            return Inside(entry.name, tuple(dict.fromkeys(named)), of, _zone(said, where))
+        case Distance.kind:
+            between = said.get("between")
+            if not isinstance(between, list) or len(between) != 2:
+                raise fields.wrong(f"{where}.between", "must be two names of bodies or geometries, [a, b]")
+            for i, one in enumerate(between):
+                _geometries(one, f"{where}.between[{i}]", scene)
+            a, b = between
+            return Distance(entry.name, a, b, fields.number(said.get("metres"), f"{where}.metres", minimum=0.0))
+    joints, degrees = said.get("joints"), said.get("degrees")
+    if not isinstance(joints, dict) or not joints:
+        raise fields.wrong(f"{where}.joints", "must map joints to 1 or -1, as in {arm/elbow: 1}")
+    if not isinstance(degrees, list) or len(degrees) != 2:
+        raise fields.wrong(f"{where}.degrees", "must be two angles in degrees, [lower, upper]")
+    signed = tuple((_joint(name, f"{where}.joints", scene), _sign(sign, f"{where}.joints.{name}")) for name, sign in joints.items())
+    lower, upper = (math.radians(fields.number(x, f"{where}.degrees[{i}]")) for i, x in enumerate(degrees))
+    return Range(entry.name, signed, lower, upper)
+
+
+def _direction(value: Any, where: str) -> tuple[float, float, float]:
+    """Returns three numbers, divided by the length of the vector."""
+    if not isinstance(value, list) or len(value) != 3:
+        raise fields.wrong(where, "must be a direction, [x, y, z]")
+    x, y, z = (fields.number(one, f"{where}[{i}]") for i, one in enumerate(value))
+    length = math.hypot(x, y, z)
+    if not length > 1e-6:
+        raise fields.wrong(where, "must be a direction, which is longer than 0")
+    return x / length, y / length, z / length
+
+
+def _zone(said: Mapping[str, Any], where: str) -> tuple[tuple[float, float, float, float], ...]:
+    """Returns the faces of a box, or the half-spaces themselves."""
+    if ("box" in said) == ("half_spaces" in said):
+        raise fields.wrong(where, "must have either box or half_spaces")
+    if "box" in said:
+        box = fields.section(said["box"], f"{where}.box", ("lower", "upper"))
+        lower, upper = (_point(box.get(key), f"{where}.box.{key}") for key in ("lower", "upper"))
+        if not all(a < b for a, b in zip(lower, upper, strict=True)):
+            raise fields.wrong(f"{where}.box", "must have an interior: each number of lower is less than that of upper")
+        axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+        above = [(*axis, x) for axis, x in zip(axes, upper, strict=True)]
+        return (*above, *((-a, -b, -c, -x) for (a, b, c), x in zip(axes, lower, strict=True)))
+    rows = said["half_spaces"]
+    if not isinstance(rows, list) or not rows:
+        raise fields.wrong(f"{where}.half_spaces", "must be a list of [a, b, c, d], each for a x + b y + c z <= d")
+    found = []
+    for i, row in enumerate(rows):
+        place = f"{where}.half_spaces[{i}]"
+        if not isinstance(row, list) or len(row) != 4:
+            raise fields.wrong(place, "must be four numbers, [a, b, c, d]")
+        normal = _direction(row[:3], place)
+        found.append((*normal, fields.number(row[3], f"{place}[3]") / math.hypot(*row[:3])))
+    return tuple(found)
+
+
+def _point(value: Any, where: str) -> tuple[float, float, float]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise fields.wrong(where, "must be a point in metres, [x, y, z]")
+    x, y, z = (fields.number(one, f"{where}[{i}]") for i, one in enumerate(value))
+    return x, y, z
+
+
+def _body(value: Any, where: str, scene: Scene) -> str:
+    name = fields.string(value, where)
+    check_known(name, scene.bodies, where)
+    return name
+
+
+def _geometries(value: Any, where: str, scene: Scene) -> list[str]:
+    """Returns the geometries that a name means: one, the parts of a mesh, or all of a body."""
+    name = fields.string(value, where)
+    found = [geometry.name for geometry in scene.geometries if name in names_of(geometry)]
+    if not found:
+        check_known(name, [known for geometry in scene.geometries for known in names_of(geometry)], where)
+    return found
+
+
+def _joint(value: Any, where: str, scene: Scene) -> str:
+    name, known = fields.string(value, where), [joint.name for joint in scene.moving]
+    if name not in known:
+        raise SceneError("unknown_name", f"{name!r} is no joint that moves", field=where, hint=f"joints: {', '.join(known)}")
+    return name
+
+
+def _sign(value: Any, where: str) -> int:
+    if value not in (1, -1) or isinstance(value, bool):
+        raise fields.wrong(where, f"must be 1 or -1, not {value!r}")
+    return int(value)

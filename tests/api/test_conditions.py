@@ -1,0 +1,55 @@
+"""A scene with conditions over HTTP: how it is described and drawn, and what questions say where a condition is not kept."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from certifier.conditioned import with_conditions
+from certifier.conditions import Cone, Inside
+from certifier.model import WORLD, Scene
+from db import scenes
+from db.session import Database
+from tests.certifier.scenes import box, planar_arm
+
+
+@pytest.fixture
+def upright(database: Database) -> Scene:
+    """A planar arm whose second link points to within 60 degrees of x, and stays below a line."""
+    arm = planar_arm(obstacle=box("world/post", WORLD, (0.1, 0.1, 0.1), (0.0, 1.9, 0.0)))
+    cone = Cone("along-x", "arm/link2", (1.0, 0.0, 0.0), WORLD, (1.0, 0.0, 0.0), math.radians(60))
+    scene = with_conditions(arm, [cone, Inside("below", ("arm/link2/bar",), WORLD, ((0.0, 1.0, 0.0, 1.2),))])
+    with database.write() as session:
+        scenes.add(session, scene)
+    return scene
+
+
+def test_a_scene_is_described_with_its_conditions_and_without_what_stands_for_them(client: TestClient, upright: Scene) -> None:
+    told = client.get("/v1/scenes/planar").json()
+    assert [(one["name"], one["kind"], one["statement"]) for one in told["conditions"]] == [
+        (one.name, one.kind, str(one)) for one in upright.conditions
+    ]
+    assert (told["geometries"], told["pairs"], told["joints"], len(told["positions"])) == (3, 2, 2, 2)
+    assert not any(body.startswith("conditions/") for body in told["bodies"])
+    assert told["not_covered"]["pairs"] == 1, "the two links, which are neighbours"
+    model = client.get("/v1/scenes/planar/model").json()
+    drawn = [geometry["name"] for geometry in model["geometries"] if geometry["vertices"]]
+    assert drawn == ["arm/link1/bar", "arm/link2/bar", "world/post"]
+    assert len(model["pairs"]) == len(upright.pairs)
+
+
+def test_a_motion_keeps_the_conditions_or_says_which_is_not_kept(client: TestClient, upright: Scene) -> None:
+    asked = {"scene": "planar", "start": [0.0, 0.0], "seconds": 1.0}
+    found = client.post("/v1/planning/plan", json={**asked, "goal": [0.5, -0.5]}).json()
+    assert found["found"], found
+    ends = np.array(found["q"]).sum(axis=1)
+    assert np.abs(ends).max() < math.radians(60)
+    refused = client.post("/v1/planning/plan", json={**asked, "goal": [-0.6, -0.6]}).json()
+    assert (refused["found"], refused["reason"]) == (False, "goal_in_collision")
+    assert refused["collision"]["condition"] == "the condition 'along-x' is not kept: the angle is 68.8 degrees, and 60 at most"
+    contacts = client.post("/v1/planning/contacts", json={"scene": "planar", "q": [[-0.6, -0.6]]}).json()["contacts"]
+    names = {name for pair in contacts[0]["pairs"] for name in (upright.pairs[pair].a, upright.pairs[pair].b)}
+    assert "conditions/along-x/direction" in names

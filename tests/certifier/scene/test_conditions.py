@@ -1,0 +1,105 @@
+"""Conditions of scene files: what they mean, and that every error names its field."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from pathlib import Path
+
+import pytest
+
+from certifier.conditions import Cone, Distance, Inside, Range
+from certifier.errors import SceneError
+from certifier.model import Scene
+from certifier.scene.conditions import condition
+from certifier.scene.file import read_scene_file
+from certifier.scene.load import load_scene
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return load_scene(EXAMPLES / "ur3e_cup/scene.yaml")
+
+
+def file(tmp_path: Path, conditions: str) -> Path:
+    """The example with other conditions."""
+    for name in ("ur3e_bin", "ur3e_cup"):
+        shutil.copytree(EXAMPLES / name, tmp_path / name)
+    path = tmp_path / "ur3e_cup/scene.yaml"
+    path.write_text(path.read_text().partition("conditions:")[0] + f"conditions:\n{conditions}\n")
+    return path
+
+
+def test_the_example_means_what_it_says(scene: Scene) -> None:
+    zone = ((1, 0, 0, 0.65), (0, 1, 0, 0.35), (0, 0, 1, 0.6), (-1, 0, 0, -0.1), (0, -1, 0, 0.35), (0, 0, -1, -0.02))
+    assert scene.conditions == (
+        Cone("upright", "cup/cup", (0, 0, 1), "world", (0, 0, 1), math.radians(15)),
+        Inside("over-the-table", ("cup/cup/wall",), "world", zone),
+    )
+    assert len(scene.pairs) == len(scene.body_pairs) + 7
+
+
+def test_all_kinds_are_read(tmp_path: Path) -> None:
+    path = file(
+        tmp_path,
+        """  - name: a
+    cone: {body: cup/cup, axis: [0, 0, 2], along: [3, 0, 4], of: arm/forearm, degrees: 90}
+  - name: b
+    inside: {what: [cup/cup/wall, arm/wrist_3], of: arm/base, half_spaces: [[0, 0, -2, 1]]}
+  - name: c
+    distance: {between: [cup/cup, table/body], metres: 0.02}
+  - name: d
+    range: {joints: {arm/elbow_joint: 1, arm/wrist_1_joint: -1}, degrees: [-200, 90]}""",
+    )
+    loaded = load_scene(path)
+    assert loaded.conditions == (
+        Cone("a", "cup/cup", (0, 0, 1), "arm/forearm", (0.6, 0, 0.8), math.radians(90)),
+        Inside("b", ("cup/cup/wall", "arm/wrist_3/box"), "arm/base", ((0, 0, -1, 0.5),)),
+        Distance("c", "cup/cup", "table/body", 0.02),
+        Range("d", (("arm/elbow_joint", 1), ("arm/wrist_1_joint", -1)), math.radians(-200), math.radians(90)),
+    )
+
+
+@pytest.mark.parametrize(
+    ("said", "code", "field", "words"),
+    [
+        ("cone: {body: cup/cup, axis: [0, 0, 1], along: [0, 0, 1]}", "scene_field", "cone.degrees", "number"),
+        ("cone: {body: cup/cup, axis: [0, 0, 1], along: [0, 0, 1], degrees: true}", "scene_field", "cone.degrees", "number"),
+        ("cone: {body: cup/cup, axis: [0, 0, 1], along: [0, 0, 1], degrees: -1}", "scene_field", "cone.degrees", "at least 0"),
+        ("cone: {body: cup/cup, axis: [0, 0], along: [0, 0, 1], degrees: 5}", "scene_field", "cone.axis", "direction"),
+        ("cone: {body: cup/cup, axis: [0, 0, 0], along: [0, 0, 1], degrees: 5}", "scene_field", "cone.axis", "longer than 0"),
+        ("cone: {body: cup/cup, axis: [0, 0, .nan], along: [0, 0, 1], degrees: 5}", "scene_field", "cone.axis[2]", "number"),
+        ("cone: {body: cup/cpu, axis: [0, 0, 1], along: [0, 0, 1], degrees: 5}", "unknown_name", "cone.body", "did you mean cup/cup"),
+        ("cone: {axis: [0, 0, 1], along: [0, 0, 1], degrees: 5}", "scene_field", "cone.body", "text"),
+        ("cone: {body: cup/cup, axis: [0, 0, 1], along: [0, 0, 1], of: lab, degrees: 5}", "unknown_name", "cone.of", "lab"),
+        ("inside: {what: cup/cup, box: {lower: [0, 0, 0], upper: [1, 1, 1]}}", "scene_field", "inside.what", "list"),
+        ("inside: {what: [cup/cup]}", "scene_field", "inside", "either box or half_spaces"),
+        ("inside: {what: [cup], box: {lower: [0, 0, 0], upper: [1, 1, 1]}}", "unknown_name", "inside.what[0]", "cup"),
+        ("inside: {what: [cup/cup], box: {lower: [0, 0, 0], upper: [1, 0, 1]}}", "scene_field", "inside.box", "interior"),
+        ("inside: {what: [cup/cup], box: {lower: [0, 0], upper: [1, 1, 1]}}", "scene_field", "inside.box.lower", "point"),
+        ("inside: {what: [cup/cup], half_spaces: []}", "scene_field", "inside.half_spaces", "list"),
+        ("inside: {what: [cup/cup], half_spaces: [[1, 0, 0]]}", "scene_field", "inside.half_spaces[0]", "four"),
+        ("inside: {what: [cup/cup], half_spaces: [[0, 0, 0, 1]]}", "scene_field", "inside.half_spaces[0]", "longer"),
+        ("distance: {between: [cup/cup], metres: 0.1}", "scene_field", "distance.between", "two names"),
+        ("distance: {between: [cup/cup, table/body]}", "scene_field", "distance.metres", "number"),
+        ("distance: {between: [cup/cup, lab], metres: 0.1}", "unknown_name", "distance.between[1]", "lab"),
+        ("range: {joints: [arm/elbow_joint], degrees: [0, 1]}", "scene_field", "range.joints", "map joints"),
+        ("range: {joints: {arm/elbow_joint: 2}, degrees: [0, 1]}", "scene_field", "range.joints.arm/elbow_joint", "1 or -1"),
+        ("range: {joints: {arm/elbow: 1}, degrees: [0, 1]}", "unknown_name", "range.joints", "no joint that moves"),
+        ("range: {joints: {arm/elbow_joint: 1}, degrees: 90}", "scene_field", "range.degrees", "two angles"),
+    ],
+)
+def test_errors_name_the_field(tmp_path: Path, scene: Scene, said: str, code: str, field: str, words: str) -> None:
+    (entry,) = read_scene_file(file(tmp_path, f"  - name: c\n    {said}")).conditions
+    with pytest.raises(SceneError, match=words) as error:
+        condition(entry, scene)
+    assert (error.value.code, error.value.field) == (code, f"conditions[0].{field}")
+
+
+def test_a_condition_that_nothing_can_break_or_keep_is_refused(tmp_path: Path) -> None:
+    path = file(tmp_path, "  - name: c\n    cone: {body: arm/base, axis: [0, 0, 1], along: [0, 0, 1], degrees: 5}")
+    with pytest.raises(SceneError, match="no joint turns the one direction against the other") as error:
+        load_scene(path)
+    assert (error.value.code, error.value.field) == ("condition", "conditions")

@@ -1,0 +1,355 @@
+"""Conditions hold where the pairs that stand for them are apart: by kinematics of our own, by Drake, and with forged scenes refused."""
+
+from __future__ import annotations
+
+import json
+import math
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydrake.multibody.parsing import LoadModelDirectivesFromString, Parser, ProcessModelDirectives
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.systems.framework import DiagramBuilder
+
+from certifier.conditioned import condition_of, tightened, trouble, with_conditions, without_conditions
+from certifier.conditions import Condition, Cone, Distance, Inside, Range, of_condition
+from certifier.errors import ProofError, RegionError, SceneError
+from certifier.jobs import local
+from certifier.jobs.clearance import clearance
+from certifier.jobs.map import grow_map
+from certifier.jobs.motion import certify as certify_motion
+from certifier.model import WORLD, Array, JointKind, Pair, Scene
+from certifier.outcome import Outcome
+from certifier.pair.collisions import in_collision
+from certifier.proof.motion import Motion, Space
+from certifier.scene.file import read_scene_file
+from certifier.scene.load import load_scene
+from certifier.seeding.free import check_free
+from certifier.verify.file import verify_file
+from certifier.verify.scene import check_scene
+from tests.certifier.scenes import ball, box, cube, planar_arm, random_tree
+
+EXAMPLE = Path(__file__).parents[2] / "examples/ur3e_cup/scene.yaml"
+HAIR = 1e-6
+"""Nothing is asked of what is nearer to where a condition begins to fail."""
+UP = (0.0, 0.0, 1.0)
+POST = box("world/post", WORLD, (0.1, 0.1, 0.1), (0.0, 1.9, 0.0))
+
+
+def poses(scene: Scene, q: Array) -> dict[str, Array]:
+    """The pose of every body in the world, (4, 4): a product of matrices along the tree, with Rodrigues' formula."""
+    found = {WORLD: np.eye(4)}
+    left = list(scene.joints)
+    while left:
+        joint = left.pop(0)
+        if joint.parent not in found:
+            left.append(joint)
+            continue
+        motion = np.eye(4)
+        if joint.kind is JointKind.REVOLUTE:
+            x, y, z = joint.axis
+            K, angle = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]), q[joint.index]
+            motion[:3, :3] += math.sin(angle) * K + (1 - math.cos(angle)) * K @ K
+        elif joint.kind is JointKind.PRISMATIC:
+            motion[:3, 3] = joint.axis * q[joint.index]
+        found[joint.child] = found[joint.parent] @ joint.X_PF @ motion @ np.linalg.inv(joint.X_BM)
+    return found
+
+
+def room(scene: Scene, condition: Condition, q: Array) -> float:
+    """How far a configuration is from failing a condition, in radians or metres; negative where it fails."""
+    X = poses(scene, q)
+    match condition:
+        case Cone():
+            a, b = X[condition.body][:3, :3] @ condition.axis, X[condition.of][:3, :3] @ condition.along
+            return condition.angle - math.atan2(float(np.linalg.norm(np.cross(a, b))), float(a @ b))
+        case Inside():
+            inverse, least = np.linalg.inv(X[condition.of]), np.inf
+            for geometry in map(scene.geometry, condition.geometries):
+                pose = inverse @ X[geometry.body]
+                points = geometry.vertices @ pose[:3, :3].T + pose[:3, 3]
+                least = min([least, *(d - float((points @ (a, b, c)).max()) - geometry.radius for a, b, c, d in condition.faces)])
+            return least
+        case Range():
+            index = {joint.name: joint.index for joint in scene.moving}
+            total = sum(sign * q[index[joint]] for joint, sign in condition.joints)
+            middle, half = (condition.lower + condition.upper) / 2, (condition.upper - condition.lower) / 2
+            return half - abs(math.remainder(total - middle, 2 * math.pi))
+    raise AssertionError(condition)
+
+
+def kept(scene: Scene, condition: Condition, q: Array) -> np.ndarray:
+    """Whether the pairs that stand for a condition are apart at joint positions (k, n)."""
+    conditioned = with_conditions(scene, [condition])
+    pairs = tuple(pair for pair in conditioned.pairs if condition_of(conditioned, pair) == condition)
+    assert pairs
+    return ~in_collision(replace(conditioned, pairs=pairs), scene.to_s(q))
+
+
+def agree(scene: Scene, condition: Condition, q: Array) -> int:
+    """How many configurations are far enough from failing or keeping a condition to compare; all of these have to be alike."""
+    compared = 0
+    for at, held in zip(q, kept(scene, condition, q), strict=True):
+        left = room(scene, condition, at)
+        if abs(left) > HAIR:
+            assert held == (left > 0), (condition, at, left)
+            compared += 1
+        assert not held or left > 0, "a condition that fails is never proved"
+    return compared
+
+
+def direction(rng: np.random.Generator) -> tuple[float, float, float]:
+    x, y, z = rng.normal(size=3)
+    length = math.hypot(x, y, z)
+    return x / length, y / length, z / length
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(0, 10**6), st.sampled_from(["cone", "inside", "range"]))
+def test_pairs_are_apart_where_the_condition_holds(seed: int, kind: str) -> None:
+    rng, tree = np.random.default_rng(seed), random_tree(seed)
+    held = [body for body in tree.bodies if body != WORLD]
+    balls = [ball(f"{body}/ball", body, 0.3, rng.normal(size=3)) for body in held[::2]]
+    geometries = balls + [box(f"{body}/box", body, rng.uniform(0.1, 1.0, 3)) for body in held[1::2]]
+    scene = replace(tree, geometries=tuple(geometries))
+    bodies = [body for body in scene.bodies if body != WORLD]
+    one, other = str(rng.choice(bodies)), str(rng.choice(scene.bodies))
+    turning = [joint.name for joint in scene.moving if joint.kind is JointKind.REVOLUTE]
+    condition: Condition
+    if kind == "cone":
+        condition = Cone("c", one, direction(rng), other, direction(rng), rng.uniform(0.01, 3.1))
+    elif kind == "inside":
+        names = [geometry.name for geometry in scene.geometries if geometry.body == one]
+        faces = tuple((*direction(rng), rng.uniform(-1.0, 3.0)) for _ in range(rng.integers(1, 5)))
+        condition = Inside("c", tuple(names), other, faces)
+    else:
+        signs = tuple((name, int(rng.choice([-1, 1]))) for name in turning if rng.random() < 0.7)
+        lower = rng.uniform(-3, 3)
+        condition = Range("c", signs, lower, lower + rng.uniform(0.01, 6.2))
+    pairs: tuple[Pair, ...] | None = None
+    with suppress(SceneError):  # Nothing moves, or a range names no joint.
+        pairs = with_conditions(scene, [condition]).pairs
+    if pairs is None:
+        return
+    q = rng.uniform(scene.q_lower, scene.q_upper, (100, scene.n))
+    if len(pairs) == len(scene.pairs):
+        assert all(room(scene, condition, at) > 0 for at in q), "no geometry reaches a face"
+        return
+    agree(scene, condition, q)
+
+
+def test_drake_says_the_same_of_the_example() -> None:
+    file, scene = read_scene_file(EXAMPLE), load_scene(EXAMPLE)
+    builder = DiagramBuilder()
+    plant, _ = AddMultibodyPlantSceneGraph(builder, 0.0)
+    ProcessModelDirectives(LoadModelDirectivesFromString(file.resolved_directives), Parser(plant))
+    plant.Finalize()
+    context, cup = plant.CreateDefaultContext(), plant.GetBodyByName("cup")
+    upright, zone = scene.conditions
+    assert isinstance(upright, Cone)
+    assert isinstance(zone, Inside)
+    vertices = scene.geometry("cup/cup/wall").vertices
+    rng, seed = np.random.default_rng(0), np.array([0, -1.7, 1.7, -1.57, -1.57, 0])
+    q = np.clip(seed + rng.normal(size=(20_000, 6)) * rng.choice([0.05, 0.2, 0.6], (20_000, 1)), scene.q_lower, scene.q_upper)
+    base = without_conditions(scene)
+    held = [kept(base, condition, q) for condition in (upright, zone)]
+    for at, up, inside in zip(q, *held, strict=True):
+        plant.SetPositions(context, at)
+        X = plant.EvalBodyPoseInWorld(context, cup)
+        angle = math.acos(np.clip(X.rotation().matrix()[2, 2], -1, 1))
+        points = X.multiply(vertices.T)
+        left = min(
+            0.65 - points[0].max(), points[0].min() - 0.1, 0.35 - np.abs(points[1]).max(), 0.6 - points[2].max(), points[2].min() - 0.02
+        )
+        assert up == (angle < math.radians(15)) or abs(angle - math.radians(15)) < HAIR
+        assert inside == (left > 0) or abs(left) < HAIR
+    assert 0.05 < held[0].mean() < 0.95
+    assert 0.05 < held[1].mean() < 0.95
+
+
+@pytest.fixture(scope="module")
+def conditioned() -> Scene:
+    """A planar arm whose second link points to within 60 degrees of x and stays below a line, with sums of angles to a range."""
+    scene = planar_arm(obstacle=POST)
+    tip = scene.geometries[1]
+    return with_conditions(
+        scene,
+        [
+            Cone("along-x", tip.body, (1.0, 0.0, 0.0), WORLD, (1.0, 0.0, 0.0), math.radians(60)),
+            Inside("below", (tip.name,), WORLD, ((0.0, 1.0, 0.0, 1.2),)),
+            Range("sum", tuple((joint.name, 1) for joint in scene.moving), -1.0, 0.9),
+        ],
+    )
+
+
+def test_a_region_keeps_the_conditions_and_says_so(conditioned: Scene) -> None:
+    grown = local.certify(conditioned, cube(conditioned, np.zeros(2), 0.1), assemble=True, cells=200)
+    assert grown.outcome is Outcome.CERTIFIED
+    assert grown.region is not None
+    lines = verify_file(grown.region.proof).lines
+    assert [line for line in lines if line.startswith("condition")] == [f"condition '{one.name}': {one}" for one in conditioned.conditions]
+    assert any(f"{len(conditioned.body_pairs)} pairs of bodies" in line for line in lines)
+    assert not any("conditions/" in line for line in lines)
+
+
+@pytest.mark.parametrize("condition", ["along-x", "below", "sum"])
+def test_a_polytope_in_which_a_condition_fails_is_refused(conditioned: Scene, condition: str) -> None:
+    """The infeasible twins: without the condition, the same polytope is certified."""
+    half, base = {"along-x": 0.4, "below": 0.45, "sum": 0.3}[condition], without_conditions(conditioned)
+    wanted = [one for one in conditioned.conditions if one.name == condition]
+    polytope = cube(base, np.zeros(2), half)
+    assert local.certify(replace(base, pairs=()), polytope).outcome is Outcome.CERTIFIED
+    failing = with_conditions(replace(base, pairs=()), wanted)
+    assert local.certify(failing, polytope, cells=2000).outcome is Outcome.REFUTED
+
+
+def test_motions_are_proved_to_keep_the_conditions_or_stop(conditioned: Scene) -> None:
+    inside = certify_motion(conditioned, Motion(Space.Q, np.array([[-0.3, 0.2], [0.3, 0.1]])))
+    assert inside.statement is not None
+    assert [line for line in inside.statement.lines() if "condition 'along-x'" in line]
+    leaves = certify_motion(conditioned, Motion(Space.Q, np.array([[0.0, 0.0], [0.9, 0.2]])))
+    assert leaves.statement is not None
+    assert leaves.statement.end < 0.9 / 1.1
+    assert leaves.stop is not None
+    assert condition_of(conditioned, leaves.stop.pair) is not None
+
+
+def test_clearances_are_about_bodies(conditioned: Scene) -> None:
+    grown = local.certify(conditioned, cube(conditioned, np.zeros(2), 0.1), assemble=True, cells=200)
+    assert grown.region is not None
+    found = clearance(grown.region.proof)
+    assert not of_condition(found.nearest.pair.a)
+    assert not of_condition(found.nearest.pair.b)
+    assert 0 < found.distance <= found.nearest.distance
+    motion = Motion(Space.Q, np.array([[-0.3, 0.2], [0.3, 0.1]]))
+    for field, asked in (("clearance", {"clearance": True}), ("padding", {"padding": 0.01})):
+        with pytest.raises(RegionError, match="is about bodies, and this scene has conditions") as error:
+            certify_motion(conditioned, motion, **asked)
+        assert (error.value.code, error.value.field) == ("has_conditions", field)
+
+
+def test_a_map_names_its_conditions(conditioned: Scene) -> None:
+    found = grow_map(conditioned, 0.5, 60.0)
+    lines = verify_file(found.proof.to_bytes()).lines
+    assert sum(line.startswith("condition") for line in lines) == 3
+
+
+def test_a_seed_is_refused_with_the_angle_or_the_distance(conditioned: Scene) -> None:
+    for name, q, words in (
+        ("along-x", [0.6, 0.6], "the angle is 68.8 degrees, and 60 at most"),
+        ("below", [1.0, 0.4], "mm beyond the zone"),
+        ("sum", [-0.6, -0.6], "11.5 degrees beyond its range"),
+    ):
+        condition = next(one for one in conditioned.conditions if one.name == name)
+        scene = with_conditions(replace(without_conditions(conditioned), pairs=()), [condition])
+        with pytest.raises(RegionError, match=f"the condition '{name}' is not kept: .*{words}") as error:
+            check_free(scene, np.array(q), "seed.q")
+        assert error.value.code == "seed_in_collision"
+
+
+def test_a_distance_is_kept_as_padding() -> None:
+    scene = planar_arm(obstacle=POST)
+    pair = scene.pairs[0]
+    apart = with_conditions(scene, [Distance("away", pair.a, pair.b, 0.1)])
+    assert apart.padding_of(pair) >= 0.05
+    assert [other for other in apart.pairs if other != pair] == [other for other in scene.pairs if other != pair]
+    check_scene(apart)
+    with pytest.raises(SceneError, match="does not certify"):
+        with_conditions(replace(scene, pairs=scene.pairs[1:]), [Distance("away", pair.a, pair.b, 0.1)])
+
+
+def test_a_scene_with_conditions_is_stored_whole(conditioned: Scene) -> None:
+    document = json.loads(json.dumps(conditioned.to_document()))
+    again = Scene.from_document(document)
+    assert (again.hash, again.conditions) == (conditioned.hash, conditioned.conditions)
+    assert with_conditions(without_conditions(again), again.conditions).hash == again.hash
+    assert without_conditions(again).hash == planar_arm(obstacle=POST).hash
+    assert "conditions" not in planar_arm().to_document()
+
+
+def test_proposals_are_made_for_narrower_conditions(conditioned: Scene) -> None:
+    cone, zone, total = tightened(conditioned).conditions
+    assert isinstance(cone, Cone)
+    assert isinstance(total, Range)
+    assert math.degrees(cone.angle) == pytest.approx(56)
+    assert zone == conditioned.conditions[1]
+    assert (total.lower, total.upper) == (pytest.approx(-0.05 - 0.95 * 14 / 15), pytest.approx(-0.05 + 0.95 * 14 / 15))
+    plain = planar_arm()
+    assert tightened(plain) is plain
+
+
+def forged(document: dict[str, Any], **changes: Any) -> Scene:
+    """The scene of a changed document, with the hash that fits it."""
+    return Scene.from_document({name: value for name, value in {**document, **changes}.items() if name != "hash"})
+
+
+def test_forged_conditions_are_refused(conditioned: Scene) -> None:
+    document = json.loads(json.dumps(conditioned.to_document()))
+    check_scene(forged(document))
+    geometries, pairs, joints = (document[name] for name in ("geometries", "pairs", "joints"))
+    place = next(i for i, one in enumerate(geometries) if one["name"].endswith("/beyond"))
+
+    def with_geometry(**changes: Any) -> list[Any]:
+        return [*geometries[:place], {**geometries[place], **changes}, *geometries[place + 1 :]]
+
+    smaller = (0.9 * np.array(geometries[place]["vertices"])).tolist()
+    wider = [{**one, "angle": 1.2} if one["kind"] == "cone" else one for one in document["conditions"]]
+    hidden = {**geometries[0], "name": "conditions/hidden/ball"}
+    frozen = [{**one, "index": 0} if of_condition(one["name"]) and one["index"] == 1 else one for one in joints]
+    forgeries: list[dict[str, Any]] = [
+        {"geometries": with_geometry(vertices=smaller)},
+        {"geometries": [{**one, "radius": 0.0} if one["name"].endswith("/direction") else one for one in geometries]},
+        {"conditions": wider},
+        {"conditions": document["conditions"][1:]},
+        {"conditions": []},
+        {"conditions": [*document["conditions"], document["conditions"][0]]},
+        {"pairs": [pair for pair in pairs if "conditions/along-x/beyond" not in pair]},
+        {"geometries": [*geometries, hidden]},
+        {"joints": frozen},
+    ]
+    for changes in forgeries:
+        with pytest.raises(ProofError) as error:
+            check_scene(forged(document, **changes))
+        assert error.value.code == "proof_model", changes
+    without = {name: value for name, value in document.items() if name != "conditions"}
+    with pytest.raises(ProofError, match="what stands for its conditions"):
+        check_scene(forged(without))
+
+
+@pytest.mark.parametrize(
+    "condition",
+    [
+        Cone("c", "nobody", UP, WORLD, UP, 0.5),
+        Cone("c", "arm/link1", UP, "nobody", UP, 0.5),
+        Cone("c", WORLD, UP, WORLD, UP, 0.5),
+        Cone("c", "arm/link1", (0.0, 0.0, 2.0), WORLD, UP, 0.5),
+        Cone("c", "arm/link1", (math.nan, 0.0, 1.0), WORLD, UP, 0.5),
+        Cone("c", "arm/link1", UP, WORLD, UP, 0.0),
+        Cone("c", "arm/link1", UP, WORLD, UP, 3.15),
+        Cone("c/d", "arm/link1", UP, WORLD, UP, 0.5),
+        Cone("turning", "arm/link1", UP, WORLD, UP, 0.5),
+        Inside("c", (), WORLD, ((1.0, 0.0, 0.0, 1.0),)),
+        Inside("c", ("nobody",), WORLD, ((1.0, 0.0, 0.0, 1.0),)),
+        Range("c", (), -1.0, 1.0),
+        Range("c", (("nobody", 1),), -1.0, 1.0),
+        Range("c", (("arm/joint1", 1), ("arm/joint1", 1)), -1.0, 1.0),
+        Range("c", (("arm/joint1", 1),), 1.0, 1.0),
+        Range("c", (("arm/joint1", 1),), -4.0, 4.0),
+        Distance("c", "nobody", "arm/link1", 0.1),
+        Distance("c", "nobody", "arm/link1", 0.0),
+    ],
+)
+def test_conditions_that_make_no_sense_are_refused(condition: Condition) -> None:
+    with pytest.raises(SceneError) as error:
+        with_conditions(planar_arm(), [condition])
+    assert error.value.code == "condition"
+
+
+def test_words_of_a_pair_of_bodies_name_both() -> None:
+    assert trouble(planar_arm(), Pair("a", "b")) == "a and b touch"
