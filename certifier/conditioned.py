@@ -29,6 +29,8 @@ LONG = 2.0
 """How far the box of the directions that are too far away extends beyond the sphere of directions."""
 TIGHT = 14 / 15
 """Proposals are made for cones and ranges that are narrower by this factor (docs/trials.md)."""
+FAR = 2.0
+"""The box beyond a face extends to this many times what the geometries reach. The tube of a motion may go beyond the limits of slides."""
 LEAST_ANGLE = math.radians(0.1)
 """A cone is no narrower than this, so that ROOM does not matter."""
 MOST_FACES = 100
@@ -47,8 +49,13 @@ def with_conditions(scene: Scene, conditions: Sequence[Condition]) -> Scene:
         scene: has no conditions.
 
     Raises:
-        SceneError: ``condition``, for one that concerns nothing that moves, or that a pair without a certificate would have to prove.
+        SceneError: ``condition``, for one that concerns nothing that moves, or that a pair without a certificate would have to prove;
+            and for a model that is called as what stands for conditions.
     """
+    names = (*scene.bodies, *(joint.name for joint in scene.joints), *(geometry.name for geometry in scene.geometries))
+    if own := next(filter(of_condition, names), None):
+        hint = "rename the model"
+        raise SceneError("condition", f"{own} would stand for a condition: no model may be called {MODEL}", field="directives", hint=hint)
     parts = _Parts(scene)
     for condition in conditions:
         check(scene, condition)
@@ -144,6 +151,12 @@ def condition_of(scene: Scene, pair: Pair) -> Condition | None:
     """Returns the condition that a pair proves; None for a pair of bodies that are to stay apart."""
     name = next((name.split("/")[1] for name in (pair.a, pair.b) if of_condition(name)), None)
     return next((condition for condition in scene.conditions if condition.name == name), None)
+
+
+def called(scene: Scene, pair: Pair) -> str:
+    """Returns what messages call a pair: its geometries, or the condition that it proves."""
+    condition = condition_of(scene, pair)
+    return f"{pair.a} and {pair.b}" if condition is None else f"the condition '{condition.name}'"
 
 
 def trouble(scene: Scene, pair: Pair, distance: float | None = None) -> str:
@@ -243,13 +256,13 @@ class _Parts:
             if offset >= reach:
                 continue  # No geometry reaches this face.
             name = f"{MODEL}/{condition.name}/face{i}"
-            vertices = _slab(np.array(normal), offset - ROOM, reach - offset + 2 * ROOM, reach)
+            vertices = _slab(np.array(normal), offset - ROOM, FAR * reach - offset, FAR * reach)
             self.geometries.append(Geometry(name, frame, vertices, 0.0, {"kind": "condition"}))
             self.pairs += [Pair(*sorted((name, geometry.name)), padding=0.0) for geometry in geometries]
 
     def _distance(self, condition: Distance) -> None:
         scene = self.scene
-        sides = [{g.name for g in scene.geometries if name in (g.name, g.body)} for name in (condition.a, condition.b)]
+        sides = [{g.name for g in scene.geometries if name in (g.name, g.body, g.shape.get("of"))} for name in (condition.a, condition.b)]
         between = {frozenset((a, b)) for a in sides[0] for b in sides[1]}
         kept = {frozenset((pair.a, pair.b)) for pair in scene.pairs}
         missing = next(iter(sorted(tuple(sorted(names)) for names in between - kept)), None)

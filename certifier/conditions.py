@@ -17,6 +17,8 @@ MODEL = "conditions"
 """Bodies and geometries that stand for conditions have names that begin with this and a slash."""
 
 Vector = tuple[float, float, float]
+_OF_A_BOX = ([1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1])
+"""The normals of the faces of a box along the axes."""
 
 
 def of_condition(name: str) -> bool:
@@ -64,8 +66,13 @@ class Inside:
     kind: ClassVar = "inside"
 
     def __str__(self) -> str:
+        names, stay = ", ".join(repr(name) for name in self.geometries), "stays" if len(self.geometries) == 1 else "stay"
+        if tuple(normal for *normal, _ in self.faces) == _OF_A_BOX:
+            offsets = [d for *_, d in self.faces]
+            box = f"in the box from {_shown(-d for d in offsets[3:])} to {_shown(offsets[:3])} m"
+            return f"{names} {stay} {box}, in the frame of '{self.of}'"
         faces = ", ".join(f"{_shown(normal)} . x <= {d:.9g} m" for *normal, d in self.faces)
-        return f"{', '.join(repr(name) for name in self.geometries)} stay where {faces}, in the frame of '{self.of}'"
+        return f"{names} {stay} where {faces}, in the frame of '{self.of}'"
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from certifier.conditioned import called, condition_of
 from certifier.errors import CirisError, RegionError
 from certifier.growth.state import GrowthState
 from certifier.growth.whole import REVOKED
@@ -35,7 +36,8 @@ def at_deadline(scene: Scene, state: GrowthState | None, told: str) -> str:
         return f"{DEADLINE}; {hindrance}" if hindrance else DEADLINE
     index, worst = max(state.obstacles.items(), key=lambda item: item[1].times)
     pair, rounds = scene.pairs[index], "1 round" if worst.times == 1 else f"{worst.times} rounds"
-    return f"{DEADLINE}; {pair.a} and {pair.b} were in the way of a region in {rounds}"
+    stands = "was" if condition_of(scene, pair) else "were"
+    return f"{DEADLINE}; {called(scene, pair)} {stands} in the way of a region in {rounds}"
 
 
 def refusal(reason: str, late: bool) -> CirisError:

@@ -17,7 +17,7 @@ from pydrake.multibody.parsing import LoadModelDirectivesFromString, Parser, Pro
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
-from certifier.conditioned import condition_of, tightened, trouble, with_conditions, without_conditions
+from certifier.conditioned import called, condition_of, tightened, trouble, with_conditions, without_conditions
 from certifier.conditions import Condition, Cone, Distance, Inside, Range, of_condition
 from certifier.errors import ProofError, RegionError, SceneError
 from certifier.jobs import local
@@ -351,5 +351,15 @@ def test_conditions_that_make_no_sense_are_refused(condition: Condition) -> None
     assert error.value.code == "condition"
 
 
-def test_words_of_a_pair_of_bodies_name_both() -> None:
+def test_no_model_is_called_as_what_stands_for_conditions() -> None:
+    arm = planar_arm()
+    own = replace(arm, geometries=(*arm.geometries, ball("conditions/box/ball", WORLD, 0.1)))
+    with pytest.raises(SceneError, match="no model may be called conditions") as error:
+        with_conditions(own, [])
+    assert (error.value.code, error.value.field) == ("condition", "directives")
+
+
+def test_words_of_a_pair_name_both_bodies_or_the_condition(conditioned: Scene) -> None:
+    assert called(conditioned, conditioned.pairs[0]) == f"{conditioned.pairs[0].a} and {conditioned.pairs[0].b}"
+    assert called(conditioned, conditioned.pairs[-1]) == "the condition 'sum'"
     assert trouble(planar_arm(), Pair("a", "b")) == "a and b touch"

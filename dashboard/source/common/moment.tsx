@@ -79,7 +79,7 @@ export function touchingOf(model: SceneModel, moment: Moment): number[] {
 }
 
 /** Whether a geometry stands for a condition of the scene. */
-function ofCondition(name: string): boolean {
+export function ofCondition(name: string): boolean {
   return name.startsWith("conditions/");
 }
 

@@ -5,6 +5,7 @@ import { shortNames } from "../common/kinematics";
 import { contains, rooms, toQ, toS, type Faces, type Space } from "../common/polytope";
 import { Robot } from "../common/robot";
 import type { Partition, RegionConfigurations, RegionDetail, RegionPair, RegionPairs, SceneModel } from "../common/schema";
+import { ofCondition } from "../common/moment";
 import { Slice } from "../common/slice";
 import { Sliders } from "../common/sliders";
 
@@ -59,6 +60,8 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
   const ghosts = useMemo(() => (swept ? configurations.samples.slice(0, GHOSTS) : []), [swept, configurations]);
   const names = shortNames(space.joints);
   const inside = contains(space, faces, q);
+  const bodies = pairs.filter(({ a, b }) => !ofCondition(a) && !ofCondition(b)).length;
+  const kept = bodies < pairs.length ? ", and the conditions hold" : "";
   const besides = region.not_covered.pairs ? ` ${region.not_covered.summary}.` : "";
 
   useEffect(() => {
@@ -85,7 +88,7 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
         <button type="button" onClick={() => go(configurations.center)}>Centre</button>
         {configurations.seed && <button type="button" onClick={() => go(configurations.seed!)}>Seed</button>}
         <label><input type="checkbox" checked={swept} onChange={(event) => setSwept(event.currentTarget.checked)} /> show {GHOSTS} samples</label>
-        <span role="status" class={inside ? "inside" : "inside not"}>{inside ? `The robot is inside the region: no collision of the ${pairs.length} pairs below, as proved.${besides}` : "The robot is outside the region: nothing is proved here."}</span>
+        <span role="status" class={inside ? "inside" : "inside not"}>{inside ? `The robot is inside the region: no collision of the ${bodies} pairs below${kept}, as proved.${besides}` : "The robot is outside the region: nothing is proved here."}</span>
       </div>
       <div class="views">
         <Robot model={model} q={q} ghosts={ghosts} label={`The robot of ${model.name} inside the region${swept ? `, with ${GHOSTS} samples of it` : ""}`} />
