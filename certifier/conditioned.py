@@ -22,7 +22,9 @@ from certifier.names import is_name
 from certifier.positions import MAGNITUDE
 
 ROOM = 1e-9
-"""A face is moved by this to the safe side, in metres, and in cosines of angles. It is far above what doubles round."""
+"""A face is moved by this to the safe side, in metres, and in cosines of angles; the face of a zone by this part of what the geometries
+reach, where that is more than a metre. It is far above what doubles round, and above what statements round in their numbers.
+"""
 BALL = 0.01
 """Radius of the ball at the end of a direction, which is 1 long."""
 LONG = 2.0
@@ -35,7 +37,7 @@ LEAST_ANGLE = math.radians(0.1)
 """A cone is no narrower than this, so that ROOM does not matter."""
 MOST_FACES = 100
 """A zone has at most this many faces."""
-UNIT = 1e-9
+UNIT = 1e-12
 """The length of a direction differs from 1 by less than this."""
 TURNING = "turning"
 """No condition has this name, which copies of bodies have that only turn."""
@@ -100,7 +102,8 @@ def check(scene: Scene, condition: Condition) -> None:
             names, known = [joint for joint, _ in condition.joints], {j.name for j in scene.moving if j.kind is JointKind.REVOLUTE}
             if not names or len(set(names)) < len(names) or not {*names} <= known:
                 raise _wrong(condition, "it has to name joints that turn and have positions of their own, each once")
-            if not 2 * LEAST_ANGLE <= condition.upper - condition.lower <= 2 * (math.pi - LEAST_ANGLE):
+            apart = condition.upper - condition.lower
+            if not (2 * LEAST_ANGLE <= apart <= 2 * (math.pi - LEAST_ANGLE) and abs(condition.lower) <= MAGNITUDE):
                 raise _wrong(condition, "its angles have to be 0.2 to 359.8 degrees apart")
 
 
@@ -256,7 +259,7 @@ class _Parts:
             if offset >= reach:
                 continue  # No geometry reaches this face.
             name = f"{MODEL}/{condition.name}/face{i}"
-            vertices = _slab(np.array(normal), offset - ROOM, FAR * reach - offset, FAR * reach)
+            vertices = _slab(np.array(normal), offset - ROOM * max(1.0, reach), FAR * reach - offset, FAR * reach)
             self.geometries.append(Geometry(name, frame, vertices, 0.0, {"kind": "condition"}))
             self.pairs += [Pair(*sorted((name, geometry.name)), padding=0.0) for geometry in geometries]
 

@@ -322,6 +322,22 @@ def test_forged_conditions_are_refused(conditioned: Scene) -> None:
         check_scene(forged(without))
 
 
+def test_what_other_machines_round_does_not_matter(conditioned: Scene) -> None:
+    def moved(by: float) -> Scene:
+        rng = np.random.default_rng(0)
+        return replace(
+            conditioned,
+            geometries=tuple(
+                replace(one, vertices=one.vertices + by * rng.choice([-1, 1], one.vertices.shape)) if of_condition(one.name) else one
+                for one in conditioned.geometries
+            ),
+        )
+
+    check_scene(moved(1e-13))
+    with pytest.raises(ProofError, match="what stands for its conditions"):
+        check_scene(moved(1e-9))
+
+
 @pytest.mark.parametrize(
     "condition",
     [
@@ -341,6 +357,8 @@ def test_forged_conditions_are_refused(conditioned: Scene) -> None:
         Range("c", (("arm/joint1", 1), ("arm/joint1", 1)), -1.0, 1.0),
         Range("c", (("arm/joint1", 1),), 1.0, 1.0),
         Range("c", (("arm/joint1", 1),), -4.0, 4.0),
+        Range("c", (("arm/joint1", 1),), 1e9, 1e9 + 1),
+        Cone("c", "arm/link1", (0.0, 0.0, 1.0 + 1e-10), WORLD, UP, 0.5),
         Distance("c", "nobody", "arm/link1", 0.1),
         Distance("c", "nobody", "arm/link1", 0.0),
     ],
