@@ -18,7 +18,7 @@ import numpy as np
 from certifier.conditions import MODEL, Condition, Cone, Distance, Inside, Range, of_condition
 from certifier.errors import SceneError
 from certifier.model import WORLD, Array, Geometry, Joint, JointKind, Pair, Scene
-from certifier.names import is_name
+from certifier.names import escaped, is_name
 from certifier.positions import MAGNITUDE
 
 ROOM = 1e-9
@@ -54,7 +54,7 @@ def with_conditions(scene: Scene, conditions: Sequence[Condition]) -> Scene:
         SceneError: ``condition``, for one that concerns nothing that moves, or that a pair without a certificate would have to prove;
             and for a model that is called as what stands for conditions.
     """
-    names = (*scene.bodies, *(joint.name for joint in scene.joints), *(geometry.name for geometry in scene.geometries))
+    names = all_names(scene)
     if own := next(filter(of_condition, names), None):
         hint = "rename the model"
         raise SceneError("condition", f"{own} would stand for a condition: no model may be called {MODEL}", field="directives", hint=hint)
@@ -64,14 +64,22 @@ def with_conditions(scene: Scene, conditions: Sequence[Condition]) -> Scene:
         parts.add(condition)
     if len({condition.name for condition in conditions}) < len(conditions):
         raise SceneError("condition", "two conditions have one name", field="conditions", hint="give each its own name")
+    if too_long := next((name for name in (*parts.names, *(g.name for g in parts.geometries)) if not is_name(name)), None):
+        raise SceneError("condition", f"the name {escaped(too_long)[:60]}... is too long", field="conditions", hint="give shorter names")
     return replace(
         scene,
         joints=(*scene.joints, *parts.joints),
-        bodies=(*scene.bodies, *(joint.child for joint in parts.joints)),
+        bodies=(*scene.bodies, *parts.names),
         geometries=(*scene.geometries, *parts.geometries),
         pairs=(*parts.padded, *parts.pairs),
         conditions=tuple(conditions),
     )
+
+
+def all_names(scene: Scene) -> list[str]:
+    """Returns the names of joints, bodies and geometries, and of what is ignored."""
+    found = [*scene.bodies, *(joint.name for joint in scene.joints), *(geometry.name for geometry in scene.geometries)]
+    return found + [name for ignored in scene.ignored for name in (ignored.a, ignored.b)]
 
 
 def check(scene: Scene, condition: Condition) -> None:
@@ -81,7 +89,7 @@ def check(scene: Scene, condition: Condition) -> None:
         SceneError: ``condition``.
     """
     if not is_name(condition.name) or "/" in condition.name or condition.name == TURNING:
-        raise _wrong(condition, "it needs a name without a slash")
+        raise _wrong(condition, f"it needs a name without a slash, which is not {TURNING!r}")
     match condition:
         case Cone():
             _check_bodies(scene, condition, condition.body, condition.of)
@@ -92,6 +100,8 @@ def check(scene: Scene, condition: Condition) -> None:
             _check_bodies(scene, condition, condition.of)
             if not condition.geometries or not all(map(scene.has_geometry, condition.geometries)):
                 raise _wrong(condition, "it has to name geometries of the scene")
+            if any(scene.geometry(name).shape.get("kind") == "half_space" for name in condition.geometries):
+                raise _wrong(condition, "a half-space has no end, so it is in no zone")
             if not condition.faces or len(condition.faces) > MOST_FACES:
                 raise _wrong(condition, f"its zone needs 1 to {MOST_FACES} faces")
             _check_vectors(condition, *(face[:3] for face in condition.faces))
@@ -162,31 +172,6 @@ def called(scene: Scene, pair: Pair) -> str:
     return f"{pair.a} and {pair.b}" if condition is None else f"the condition '{condition.name}'"
 
 
-def trouble(scene: Scene, pair: Pair, distance: float | None = None) -> str:
-    """Returns in words that a pair touches, or that the condition that it proves is not kept.
-
-    Args:
-        distance: of the two geometries, in metres, where it is known; negative where they overlap. Of a cone it is a difference of cosines.
-    """
-    condition = condition_of(scene, pair)
-    if condition is None:
-        return f"{pair.a} and {pair.b} touch"
-    by = ""
-    if distance is not None and math.isfinite(distance):
-        match condition:
-            case Cone():
-                angle = math.degrees(math.acos(max(math.cos(condition.angle) + min(distance, 0.0), -1.0)))
-                by = f": the angle is {angle:.3g} degrees, and {math.degrees(condition.angle):.9g} at most"
-            case Range():
-                half = (condition.upper - condition.lower) / 2
-                beyond = math.degrees(math.acos(max(math.cos(half) + min(distance, 0.0), -1.0)) - half)
-                by = f": the sum of the angles is {beyond:.3g} degrees beyond its range"
-            case _:
-                geometry = next(name for name in (pair.a, pair.b) if not of_condition(name))
-                by = f": {geometry} reaches {-1000 * min(distance, 0.0):.3g} mm beyond the zone"
-    return f"the condition '{condition.name}' is not kept{by}"
-
-
 @dataclass
 class _Parts:
     """Gathers what stands for the conditions of a scene."""
@@ -196,6 +181,11 @@ class _Parts:
     geometries: list[Geometry] = field(default_factory=list)
     pairs: list[Pair] = field(default_factory=list)
     padded: list[Pair] = field(init=False)
+
+    @property
+    def names(self) -> list[str]:
+        """The bodies."""
+        return [joint.child for joint in self.joints]
 
     def __post_init__(self) -> None:
         self.padded = list(self.scene.pairs)
@@ -214,8 +204,7 @@ class _Parts:
 
     def _cone(self, condition: Cone | Range, body: str, axis: Sequence[float], of: str, along: Sequence[float]) -> None:
         angle = condition.angle if isinstance(condition, Cone) else (condition.upper - condition.lower) / 2
-        if not _moves(self.joints, body, of):
-            raise _wrong(condition, "no joint turns the one direction against the other")
+        _check_way(condition, self.joints, body, of, "no joint turns the one direction against the other")
         top = math.cos(angle) + ROOM - BALL
         beyond = _slab(np.array(along), top, -LONG - top, LONG)
         ball = np.array([_unit(axis)])
@@ -252,8 +241,7 @@ class _Parts:
         self.joints.append(Joint(frame, JointKind.WELD, condition.of, frame, np.zeros(3), np.eye(4), np.eye(4)))
         geometries = [scene.geometry(name) for name in condition.geometries]
         for geometry in geometries:
-            if not _moves(scene.joints, geometry.body, condition.of):
-                raise _wrong(condition, f"{geometry.name} does not move against {condition.of}")
+            _check_way(condition, scene.joints, geometry.body, condition.of, f"{geometry.name} does not move against {condition.of}")
         reach = max(_reach(scene, geometry, condition.of) for geometry in geometries)
         for i, (*normal, offset) in enumerate(condition.faces):
             if offset >= reach:
@@ -327,8 +315,14 @@ def _path(joints: Iterable[Joint], body: str, of: str) -> list[Joint]:
     return one + other
 
 
-def _moves(joints: Iterable[Joint], body: str, of: str) -> bool:
-    return any(joint.index is not None for joint in _path(joints, body, of))
+def _check_way(condition: Condition, joints: Iterable[Joint], body: str, of: str, still: str) -> None:
+    """Checks that a joint moves two bodies against each other, and that no two of one position do, which the verifier does not take."""
+    moving = [joint for joint in _path(joints, body, of) if joint.index is not None]
+    if not moving:
+        raise _wrong(condition, still)
+    slides = len(moving) == 2 and all(joint.kind is JointKind.PRISMATIC for joint in moving)
+    if len({joint.index for joint in moving}) < len(moving) and not slides:
+        raise _wrong(condition, f"joints that move together are between {body} and {of}")
 
 
 def _reach(scene: Scene, geometry: Geometry, of: str) -> float:
@@ -341,4 +335,6 @@ def _reach(scene: Scene, geometry: Geometry, of: str) -> float:
 
 
 def _wrong(condition: Condition, problem: str) -> SceneError:
-    return SceneError("condition", f"{condition.name}: {problem}", field="conditions", hint="docs/conditions.md says what conditions need")
+    return SceneError(
+        "condition", f"{escaped(condition.name)}: {problem}", field="conditions", hint="docs/conditions.md says what conditions need"
+    )

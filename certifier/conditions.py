@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import TYPE_CHECKING, Any, ClassVar
 
 if TYPE_CHECKING:  # The command reads scene files without numpy, which documents need.
@@ -15,6 +16,9 @@ if TYPE_CHECKING:  # The command reads scene files without numpy, which document
 
 MODEL = "conditions"
 """Bodies and geometries that stand for conditions have names that begin with this and a slash."""
+
+DIGITS, NEARLY = 9, 1e-13
+"""Statements give numbers to DIGITS digits, rounded to the safe side; a part NEARLY of a number is not seen."""
 
 Vector = tuple[float, float, float]
 _OF_A_BOX = ([1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1])
@@ -45,7 +49,7 @@ class Cone:
     kind: ClassVar = "cone"
 
     def __str__(self) -> str:
-        angle = f"{math.degrees(self.angle):.9g} degrees"
+        angle = f"{_up(math.degrees(self.angle))} degrees"
         return f"the direction {_shown(self.axis)} of '{self.body}' stays within {angle} of {_shown(self.along)} of '{self.of}'"
 
 
@@ -69,9 +73,10 @@ class Inside:
         names, stay = ", ".join(repr(name) for name in self.geometries), "stays" if len(self.geometries) == 1 else "stay"
         if tuple(normal for *normal, _ in self.faces) == _OF_A_BOX:
             offsets = [d for *_, d in self.faces]
-            box = f"in the box from {_shown(-d for d in offsets[3:])} to {_shown(offsets[:3])} m"
+            lower, upper = (", ".join(side) for side in ([_down(-d) for d in offsets[3:]], [_up(d) for d in offsets[:3]]))
+            box = f"in the box from ({lower}) to ({upper}) m"
             return f"{names} {stay} {box}, in the frame of '{self.of}'"
-        faces = ", ".join(f"{_shown(normal)} . x <= {d:.9g} m" for *normal, d in self.faces)
+        faces = ", ".join(f"{_shown(normal)} . x <= {_up(d)} m" for *normal, d in self.faces)
         return f"{names} {stay} where {faces}, in the frame of '{self.of}'"
 
 
@@ -86,7 +91,7 @@ class Distance:
     kind: ClassVar = "distance"
 
     def __str__(self) -> str:
-        return f"'{self.a}' and '{self.b}' stay at least {self.metres:.9g} m apart"
+        return f"'{self.a}' and '{self.b}' stay at least {_down(self.metres)} m apart"
 
 
 @dataclass(frozen=True)
@@ -106,7 +111,8 @@ class Range:
 
     def __str__(self) -> str:
         total = " ".join(f"{'+' if sign > 0 else '-'} '{joint}'" for joint, sign in self.joints).removeprefix("+ ")
-        return f"{total} stays from {math.degrees(self.lower):.9g} to {math.degrees(self.upper):.9g} degrees, but for whole turns"
+        lower, upper = _down(math.degrees(self.lower)), _up(math.degrees(self.upper))
+        return f"{total} stays from {lower} to {upper} degrees, but for whole turns"
 
 
 Condition = Cone | Inside | Distance | Range
@@ -142,7 +148,7 @@ def from_document(node: Node) -> Condition:
         CirisError: document.
     """
     kind = node.value.get("kind") if isinstance(node.value, dict) else None
-    if kind not in _READ:
+    if not isinstance(kind, str) or kind not in _READ:
         node.refuse(f"a condition, whose kind is one of {', '.join(_READ)}")
     fields, read = _READ[kind]
     return read(node.fields("kind", *fields))
@@ -153,7 +159,23 @@ def _plain(value: Any) -> Any:
 
 
 def _shown(vector: Iterable[float]) -> str:
-    return f"({', '.join(f'{x + 0.0:.9g}' for x in vector)})"
+    """Returns a direction with all digits of its doubles."""
+    return f"({', '.join(f'{x:g}' if x == int(x) else repr(x) for x in (y + 0.0 for y in vector))})"
+
+
+def _up(x: float) -> str:
+    """Returns a number, to nine digits, that is no smaller but for what certifier.conditioned.ROOM covers."""
+    return _rounded(x - NEARLY * abs(x), ROUND_CEILING)
+
+
+def _down(x: float) -> str:
+    """Returns a number, to nine digits, that is no larger but for what certifier.conditioned.ROOM covers."""
+    return _rounded(x + NEARLY * abs(x), ROUND_FLOOR)
+
+
+def _rounded(x: float, how: str) -> str:
+    found = Context(prec=DIGITS, rounding=how).create_decimal(x)
+    return f"{found.normalize() + 0:f}"
 
 
 def _text(fields: dict[str, Node], name: str) -> str:
@@ -177,7 +199,7 @@ def _signed(node: Node) -> tuple[tuple[str, int], ...]:
     found = []
     for one in node.items():
         joint, sign = one.two()
-        if sign.value not in (1, -1):
+        if type(sign.value) is not int or sign.value not in (1, -1):
             sign.refuse("1 or -1")
         found.append((joint.text(), int(sign.value)))
     return tuple(found)

@@ -14,7 +14,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from certifier.conditioned import called, trouble
+from certifier.broken import trouble
+from certifier.conditioned import called
 from certifier.growth.actions import Certify, Finish, Outcomes, Transition
 from certifier.growth.obstacles import Obstacle, joined
 from certifier.growth.options import ENOUGH, MOST_CELLS

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -60,8 +60,11 @@ def read_conditions(value: Any) -> tuple[ConditionEntry, ...]:
     return tuple(found)
 
 
-def condition(entry: ConditionEntry, scene: Scene) -> Condition:
+def condition(entry: ConditionEntry, scene: Scene, swept: Collection[str] = ()) -> Condition:
     """Returns the condition that an entry describes.
+
+    Args:
+        swept: joints that are swept. Geometries behind them stand for all of their places, but frames are in the middle.
 
     Raises:
         SceneError: ``scene_field``; ``unknown_name``, for a body, a geometry or a joint that the scene does not have.
@@ -72,12 +75,15 @@ def condition(entry: ConditionEntry, scene: Scene) -> Condition:
             axis, along = (_direction(said.get(key), f"{where}.{key}") for key in ("axis", "along"))
             angle = math.radians(fields.number(said.get("degrees"), f"{where}.degrees", minimum=0.0))
             body, of = _body(said.get("body"), f"{where}.body", scene), _body(said.get("of", WORLD), f"{where}.of", scene)
+            for key, name in (("body", body), ("of", of)):
+                _check_not_swept(name, f"{where}.{key}", scene, swept)
             return Cone(entry.name, body, axis, of, along, angle)
         case Inside.kind:
             what = said.get("what")
             if not isinstance(what, list) or not what:
                 raise fields.wrong(f"{where}.what", "must be a list of bodies or geometries, such as [arm/hand]")
             of = _body(said.get("of", WORLD), f"{where}.of", scene)
+            _check_not_swept(of, f"{where}.of", scene, swept)
             named = [name for i, one in enumerate(what) for name in _geometries(one, f"{where}.what[{i}]", scene)]
             return Inside(entry.name, tuple(dict.fromkeys(named)), of, _zone(said, where))
         case Distance.kind:
@@ -96,6 +102,16 @@ def condition(entry: ConditionEntry, scene: Scene) -> Condition:
     signed = tuple((_joint(name, f"{where}.joints", scene), _sign(sign, f"{where}.joints.{name}")) for name, sign in joints.items())
     lower, upper = (math.radians(fields.number(x, f"{where}.degrees[{i}]")) for i, x in enumerate(degrees))
     return Range(entry.name, signed, lower, upper)
+
+
+def _check_not_swept(body: str, where: str, scene: Scene, swept: Collection[str]) -> None:
+    """Refuses a body behind a joint that is swept, whose directions and frame nobody knows."""
+    above = scene.joint_above
+    while body in above:
+        if above[body].name in swept:
+            hint = f"leave {above[body].name} out of fix, or hold it at a position"
+            raise fields.wrong(where, f"is behind the joint {above[body].name}, which is swept", hint=hint)
+        body = above[body].parent
 
 
 def _direction(value: Any, where: str) -> tuple[float, float, float]:

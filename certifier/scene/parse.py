@@ -152,7 +152,7 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     states, left_out = srdf_configurations(scene, semantics, at, followers)
     files = {entry.reason: one.file for one in semantics for entry in one.ignore}
     named = replace(scene, configurations=states | own_configurations(scene, scene_file.configurations))
-    document = with_conditions(named, [condition(entry, scene) for entry in scene_file.conditions]).to_document()
+    document = with_conditions(named, [condition(entry, scene, sweeps) for entry in scene_file.conditions]).to_document()
     document["warnings"] = (
         warnings
         + said_of(sweeps)

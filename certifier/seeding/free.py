@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.geometry import QueryObject
 
-from certifier.conditioned import condition_of, trouble
+from certifier.broken import trouble
+from certifier.conditioned import condition_of
 from certifier.errors import RegionError
 from certifier.model import Array, Pair, Scene
 from certifier.scene.drake_model import InDrake, build_diagram, geometry_name
@@ -110,7 +111,7 @@ def check_free(scene: Scene, q: Array, field: str) -> Nearest:
         if distance <= 0:
             message += _hollow(scene, pair)
     else:
-        message, hint = trouble(scene, pair, distance), "move the seed, or change the condition"
+        message, hint = trouble(scene, pair, q), "move the seed, or change the condition"
     if found is not None:
         hint = _said(scene, scene.in_windows(q), found, written(clearance, found, room))
     raise RegionError("seed_in_collision", message, field=field, hint=hint)

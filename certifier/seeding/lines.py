@@ -11,7 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from certifier.conditioned import trouble
+from certifier.broken import trouble
 from certifier.errors import RegionError
 from certifier.model import Array, Pair, Scene
 from certifier.motion.intervals import RESOLUTION
@@ -72,4 +72,4 @@ def _check_hull(scene: Scene, points: Array) -> None:
 
 
 def _touch(scene: Scene, pair: Pair, q: Array) -> str:
-    return f"{trouble(scene, pair)} at q = {', '.join(f'{x:.9g}' for x in q)}"
+    return f"{trouble(scene, pair, q)} at q = {', '.join(f'{x:.9g}' for x in q)}"

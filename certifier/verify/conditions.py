@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from certifier.conditioned import with_conditions, without_conditions
+from certifier.conditioned import all_names, with_conditions, without_conditions
 from certifier.conditions import of_condition
 from certifier.errors import ProofError, SceneError
 from certifier.model import Scene
@@ -23,7 +23,7 @@ def check_conditions(scene: Scene) -> None:
     Raises:
         ProofError: proof_model.
     """
-    if not scene.conditions and not any(map(of_condition, [*scene.bodies, *(geometry.name for geometry in scene.geometries)])):
+    if not scene.conditions and not any(map(of_condition, all_names(scene))):
         return
     try:
         expected = with_conditions(without_conditions(scene), scene.conditions)

@@ -41,16 +41,16 @@ class MapStatement:
         scene = self.scene
         pairs = len(scene.pairs)
         free = (
-            f"{self.missing} of {pairs} pairs of bodies have no cells: no configuration is proved to be free"
+            f"{self.missing} of {pairs} pairs have no cells: no configuration is proved to be free"
             if self.missing
-            else f"{pairs} pairs of bodies; a configuration is free of collision if it is in a cell of each of them"
+            else f"{len(scene.body_pairs)} pairs of bodies; a configuration is free of collision if it is in a cell of each of them"
         )
         return [
             f"scene of hash {scene.hash}",
             *following(scene),
             f"a map of {self.cells} cells of the joint space within the joint limits; in each of them, a pair of bodies is apart",
             free,
-            *conditions(scene),
+            *([] if self.missing else [f"there, {line}" for line in conditions(scene)]),
             *paddings(scene),
             *not_covered(scene),
             "guarantee: exact (rigorous arithmetic; the parsed model taken at its word)",

@@ -49,7 +49,7 @@ def test_a_motion_keeps_the_conditions_or_says_which_is_not_kept(client: TestCli
     assert np.abs(ends).max() < math.radians(60)
     refused = client.post("/v1/planning/plan", json={**asked, "goal": [-0.6, -0.6]}).json()
     assert (refused["found"], refused["reason"]) == (False, "goal_in_collision")
-    assert refused["collision"]["condition"] == "the condition 'along-x' is not kept: the angle is 68.8 degrees, and 60 at most"
+    assert refused["collision"]["condition"] == "the condition 'along-x' is not kept: the angle is 68.75 degrees, and 60 at most"
     contacts = client.post("/v1/planning/contacts", json={"scene": "planar", "q": [[-0.6, -0.6]]}).json()["contacts"]
     names = {name for pair in contacts[0]["pairs"] for name in (upright.pairs[pair].a, upright.pairs[pair].b)}
     assert "conditions/along-x/direction" in names

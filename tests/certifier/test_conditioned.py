@@ -17,7 +17,8 @@ from pydrake.multibody.parsing import LoadModelDirectivesFromString, Parser, Pro
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
-from certifier.conditioned import called, condition_of, tightened, trouble, with_conditions, without_conditions
+from certifier.broken import trouble
+from certifier.conditioned import called, condition_of, tightened, with_conditions, without_conditions
 from certifier.conditions import Condition, Cone, Distance, Inside, Range, of_condition
 from certifier.errors import ProofError, RegionError, SceneError
 from certifier.jobs import local
@@ -237,14 +238,15 @@ def test_clearances_are_about_bodies(conditioned: Scene) -> None:
 def test_a_map_names_its_conditions(conditioned: Scene) -> None:
     found = grow_map(conditioned, 0.5, 60.0)
     lines = verify_file(found.proof.to_bytes()).lines
-    assert sum(line.startswith("condition") for line in lines) == 3
+    assert sum(line.startswith("there, condition") for line in lines) == 3
 
 
 def test_a_seed_is_refused_with_the_angle_or_the_distance(conditioned: Scene) -> None:
     for name, q, words in (
-        ("along-x", [0.6, 0.6], "the angle is 68.8 degrees, and 60 at most"),
+        ("along-x", [1.5, 1.4], "the angle is 166.2 degrees, and 60 at most"),
+        ("along-x", [0.6, 0.6], "the angle is 68.75 degrees, and 60 at most"),
         ("below", [1.0, 0.4], "mm beyond the zone"),
-        ("sum", [-0.6, -0.6], "11.5 degrees beyond its range"),
+        ("sum", [-0.6, -0.6], "11.46 degrees beyond its range"),
     ):
         condition = next(one for one in conditioned.conditions if one.name == name)
         scene = with_conditions(replace(without_conditions(conditioned), pairs=()), [condition])
@@ -312,6 +314,8 @@ def test_forged_conditions_are_refused(conditioned: Scene) -> None:
         {"pairs": [pair for pair in pairs if "conditions/along-x/beyond" not in pair]},
         {"geometries": [*geometries, hidden]},
         {"joints": frozen},
+        {"ignored": [{"pair": ["arm/link1/bar", "conditions/along-x/beyond"], "reason": "x"}]},
+        {"joints": [{**joints[0], "name": "conditions/joint1"}, *joints[1:]]},
     ]
     for changes in forgeries:
         with pytest.raises(ProofError) as error:
@@ -320,6 +324,32 @@ def test_forged_conditions_are_refused(conditioned: Scene) -> None:
     without = {name: value for name, value in document.items() if name != "conditions"}
     with pytest.raises(ProofError, match="what stands for its conditions"):
         check_scene(forged(without))
+
+
+@pytest.mark.parametrize("kind", [["cone"], {"cone": 1}, None, "sphere", 3])
+def test_a_condition_of_no_kind_is_no_document(conditioned: Scene, kind: object) -> None:
+    with pytest.raises(SceneError, match="a condition, whose kind is one of"):
+        forged(conditioned.to_document(), conditions=[{"kind": kind, "name": "c"}])
+
+
+def test_numbers_of_statements_are_rounded_to_the_safe_side() -> None:
+    cone = Cone("c", "a", UP, "b", (0.6, 0.0, 0.8), math.radians(123.4567894))
+    assert str(cone) == "the direction (0, 0, 1) of 'a' stays within 123.45679 degrees of (0.6, 0, 0.8) of 'b'"
+    assert str(Distance("d", "a", "b", 0.1000000005001)) == "'a' and 'b' stay at least 0.1 m apart"
+    assert "x <= 0.12345679 m" in str(Inside("i", ("a",), "b", ((0.6, 0.8, 0.0, 0.1234567891),)))
+    assert "from -1 to 0.0572957796 degrees" in str(Range("r", (("a", 1),), math.radians(-1), 0.001))
+
+
+def test_a_half_space_is_in_no_zone_and_joints_that_move_together_are_refused() -> None:
+    arm = planar_arm()
+    floor = replace(arm.geometries[0], shape={"kind": "half_space"})
+    zone = Inside("c", (floor.name,), WORLD, ((1.0, 0.0, 0.0, 0.5),))
+    with pytest.raises(SceneError, match="a half-space has no end"):
+        with_conditions(replace(arm, geometries=(floor, *arm.geometries[1:])), [zone])
+    follower = replace(arm.joints[1], index=0, follows=True)
+    led = replace(arm, joints=(arm.joints[0], follower), q_star=np.zeros(1))
+    with pytest.raises(SceneError, match="joints that move together are between"):
+        with_conditions(led, [Cone("c", "arm/link2", (1.0, 0.0, 0.0), WORLD, (1.0, 0.0, 0.0), 0.5)])
 
 
 def test_what_other_machines_round_does_not_matter(conditioned: Scene) -> None:

@@ -103,3 +103,16 @@ def test_a_condition_that_nothing_can_break_or_keep_is_refused(tmp_path: Path) -
     with pytest.raises(SceneError, match="no joint turns the one direction against the other") as error:
         load_scene(path)
     assert (error.value.code, error.value.field) == ("condition", "conditions")
+
+
+def test_a_frame_behind_a_swept_joint_is_refused(tmp_path: Path) -> None:
+    for i, said in enumerate(
+        (
+            "cone: {body: cup/cup, axis: [0, 0, 1], along: [0, 0, 1], degrees: 15}",
+            "inside: {what: [arm/upper_arm], of: arm/wrist_3, box: {lower: [-9, -9, -9], upper: [9, 9, 9]}}",
+        )
+    ):
+        path = file(tmp_path / str(i), f"  - name: c\n    {said}\nfix: {{arm/wrist_3_joint: swept}}")
+        with pytest.raises(SceneError, match="is behind the joint arm/wrist_3_joint, which is swept") as error:
+            load_scene(path)
+        assert error.value.code == "scene_field"
