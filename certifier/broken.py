@@ -36,7 +36,7 @@ def trouble(scene: Scene, pair: Pair, q: Array | None = None) -> str:
                 beyond = abs(math.remainder(total - middle, 2 * math.pi)) - half
                 by = f": the sum of the angles is {math.degrees(beyond):.4g} degrees beyond its range"
             case Inside():
-                geometry = scene.geometry(pair.a if scene.geometry(pair.a).name in condition.geometries else pair.b)
+                geometry = scene.geometry(pair.a if pair.a in condition.geometries else pair.b)
                 faces = np.array(condition.faces)
                 points = kinematics.points(condition.of, geometry.body, geometry.vertices, s)[0]
                 beyond = float((points @ faces[:, :3].T - faces[:, 3]).max()) + geometry.radius

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from certifier.conditions import MODEL, Condition, Cone, Distance, Inside, Range, of_condition
+from certifier.conditions import MODEL, Condition, Cone, Distance, Inside, Range, condition_named, of_condition
 from certifier.errors import SceneError
 from certifier.model import WORLD, Array, Geometry, Joint, JointKind, Pair, Scene
 from certifier.names import escaped, is_name
@@ -60,7 +60,7 @@ def with_conditions(scene: Scene, conditions: Sequence[Condition]) -> Scene:
         raise SceneError("condition", f"{own} would stand for a condition: no model may be called {MODEL}", field="directives", hint=hint)
     parts = _Parts(scene)
     for condition in conditions:
-        check(scene, condition)
+        _check(scene, condition)
         parts.add(condition)
     if len({condition.name for condition in conditions}) < len(conditions):
         raise SceneError("condition", "two conditions have one name", field="conditions", hint="give each its own name")
@@ -82,7 +82,7 @@ def all_names(scene: Scene) -> list[str]:
     return found + [name for ignored in scene.ignored for name in (ignored.a, ignored.b)]
 
 
-def check(scene: Scene, condition: Condition) -> None:
+def _check(scene: Scene, condition: Condition) -> None:
     """Checks that a condition makes sense in a scene.
 
     Raises:
@@ -136,7 +136,7 @@ def without_conditions(scene: Scene) -> Scene:
         joints=tuple(joint for joint in scene.joints if not of_condition(joint.child)),
         bodies=tuple(body for body in scene.bodies if not of_condition(body)),
         geometries=tuple(geometry for geometry in scene.geometries if not of_condition(geometry.name)),
-        pairs=tuple(pair for pair in scene.pairs if not (of_condition(pair.a) or of_condition(pair.b))),
+        pairs=tuple(pair for pair in scene.pairs if condition_named(pair.a, pair.b) is None),
         conditions=(),
     )
 
@@ -162,7 +162,7 @@ def _tightened(condition: Condition) -> Condition:
 
 def condition_of(scene: Scene, pair: Pair) -> Condition | None:
     """Returns the condition that a pair proves; None for a pair of bodies that are to stay apart."""
-    name = next((name.split("/")[1] for name in (pair.a, pair.b) if of_condition(name)), None)
+    name = condition_named(pair.a, pair.b)
     return next((condition for condition in scene.conditions if condition.name == name), None)
 
 
@@ -207,8 +207,10 @@ class _Parts:
         _check_way(condition, self.joints, body, of, "no joint turns the one direction against the other")
         top = math.cos(angle) + ROOM - BALL
         beyond = _slab(np.array(along), top, -LONG - top, LONG)
-        ball = np.array([_unit(axis)])
-        self._pair(condition, body, "direction", ball, BALL, of, "beyond", beyond)
+        names, shape = [f"{MODEL}/{condition.name}/{one}" for one in ("beyond", "direction")], {"kind": "condition"}
+        self.geometries.append(Geometry(names[1], body, np.array([_unit(axis)]), BALL, shape))
+        self.geometries.append(Geometry(names[0], of, beyond, 0.0, shape))
+        self.pairs.append(Pair(names[0], names[1], padding=0.0))
 
     def _turning(self, body: str) -> str:
         """Returns the copy of a body that turns as the body does, but never moves: its joints have no offsets."""
@@ -267,14 +269,6 @@ class _Parts:
             else pair
             for pair in self.padded
         ]
-
-    def _pair(
-        self, condition: Condition, body: str, what: str, vertices: Array, radius: float, other: str, against: str, others: Array
-    ) -> None:
-        names = [f"{MODEL}/{condition.name}/{one}" for one in (what, against)]
-        shape = {"kind": "condition"}
-        self.geometries += [Geometry(names[0], body, vertices, radius, shape), Geometry(names[1], other, others, 0.0, shape)]
-        self.pairs.append(Pair(*sorted(names), padding=0.0))
 
 
 def _slab(normal: Array, begin: float, depth: float, lateral: float) -> Array:

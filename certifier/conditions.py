@@ -30,6 +30,11 @@ def of_condition(name: str) -> bool:
     return name.startswith(f"{MODEL}/")
 
 
+def condition_named(*names: str) -> str | None:
+    """Returns the name of the condition that one of the geometries stands for; None where none does."""
+    return next((name.split("/")[1] for name in names if of_condition(name)), None)
+
+
 @dataclass(frozen=True)
 class Cone:
     """A direction of a body stays within an angle of a direction of another body, or of the world.

@@ -294,7 +294,7 @@ class Scene(ConfigurationSpace):
     @cached_property
     def body_pairs(self) -> tuple[Pair, ...]:
         """Returns the pairs that stand for no condition."""
-        return tuple(pair for pair in self.pairs if not (conditions.of_condition(pair.a) or conditions.of_condition(pair.b)))
+        return tuple(pair for pair in self.pairs if conditions.condition_named(pair.a, pair.b) is None)
 
     @cached_property
     def _own_paddings(self) -> dict[Pair, float]:

@@ -7,7 +7,7 @@ import math
 from argparse import Namespace
 from typing import Any
 
-from certifier.conditions import of_condition
+from certifier.conditions import condition_named
 from certifier.errors import CirisError
 from certifier.motion.padding import padding_of
 from certifier.verify.decimals import at_least_mm, rounded_down
@@ -100,9 +100,9 @@ def _timed(document: dict[str, Any], path: GivenPath) -> dict[str, Any]:
 def _print(document: dict[str, Any]) -> None:
     stop, certified, tube, degree = (document[name] for name in ("stop", "certified_to", "tube", "degree"))
     if stop:
-        broken = [name.split("/")[1] for name in (stop["a"], stop["b"]) if of_condition(name)][:1]
+        broken = condition_named(stop["a"], stop["b"])
         fails = "is not kept" if document["outcome"] == "refuted" else "could not be decided"
-        what = f"the condition '{broken[0]}' {fails}" if broken else f"{stop['a']} and {stop['b']} {_how(document)}"
+        what = f"the condition '{broken}' {fails}" if broken else f"{stop['a']} and {stop['b']} {_how(document)}"
         print(f"{what} {_place(stop, degree)}")
         print(f"q = {_joints(stop)}")
         print(f"all pairs are certified up to {_place(certified, degree)}" if certified else "nothing is certified before that")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -101,6 +101,22 @@ def holds_a_step(job_id: str, machine: Machine) -> bool:
         return any(parent is not None and int(parent.split(":")[1]) == machine.pid for parent in parents)
 
 
+def cut_again_and_again(job_id: str, machine: Machine, link: str, holds: Callable[[], bool]) -> None:
+    """Cuts a link of a machine for a while whenever it works on a job, until the job ends."""
+    cuts = 0
+    while not job_of(job_id).finished_at:
+        if not holds():
+            time.sleep(0.01)
+            continue
+        machine.cut(link)
+        time.sleep(2.0)
+        machine.restore(link)
+        cuts += 1
+        time.sleep(1.0)
+    assert cuts > 0
+    print(f"{cuts} cuts")
+
+
 def job(arm: tuple[Scene, np.ndarray], radius: float) -> str:
     scene, s = arm
     return submit(scene, box_around(s, radius))
@@ -175,39 +191,22 @@ def test_a_region_of_cells_is_the_same_though_a_link_is_cut_again_and_again(plan
     options = grow_box(planar.to_s([0.4, 0.3]), 0.4, cells=600)
     undisturbed = submit(planar, options)
     assert ended(undisturbed).outcome == "certified"
-    job_id, cuts = submit(planar, options), 0
-    while not job_of(job_id).finished_at:
-        held = [row for row in pairs_of(job_id) if row.state == "running" and row.pair_index in work_of(job_id, site.first)]
-        if not held:
-            time.sleep(0.01)
-            continue
-        site.first.cut(link)
-        time.sleep(2.0)
-        site.first.restore(link)
-        cuts += 1
-        time.sleep(1.0)
+    job_id = submit(planar, options)
+
+    def holds() -> bool:
+        return any(row.state == "running" and row.pair_index in work_of(job_id, site.first) for row in pairs_of(job_id))
+
+    cut_again_and_again(job_id, site.first, link, holds)
     check_record(job_id)
-    assert cuts > 0
-    print(f"{cuts} cuts")
     assert region_of(job_id) == region_of(undisturbed)
 
 
 @pytest.mark.parametrize("link", [REDIS, DATABASE])
 def test_a_map_is_the_same_though_a_link_is_cut_again_and_again(arm: tuple[Scene, np.ndarray], site: Site, link: str) -> None:
     scene, options = arm[0], MapOptions(coverage=0.84)
-    job_id, cuts = submit(scene, {**asdict(options), "former": None}, kind="map"), 0
-    while not job_of(job_id).finished_at:
-        if not holds_a_step(job_id, site.first):
-            time.sleep(0.01)
-            continue
-        site.first.cut(link)
-        time.sleep(2.0)
-        site.first.restore(link)
-        cuts += 1
-        time.sleep(1.0)
+    job_id = submit(scene, {**asdict(options), "former": None}, kind="map")
+    cut_again_and_again(job_id, site.first, link, partial(holds_a_step, job_id, site.first))
     assert job_of(job_id).state == "succeeded", job_of(job_id).reason
-    assert cuts > 0
-    print(f"{cuts} cuts")
     with database().read() as session:
         digest = session.scalar(select(StepRow.proof_digest).where(StepRow.job_id == job_id, StepRow.kind == ACCEPT))
         assert digest is not None
