@@ -266,6 +266,22 @@ def test_a_distance_is_kept_as_padding() -> None:
         with_conditions(replace(scene, pairs=scene.pairs[1:]), [Distance("away", pair.a, pair.b, 0.1)])
 
 
+def test_a_distance_is_refuted_where_it_is_not_kept() -> None:
+    """The infeasible twin of a distance, and 2000 configurations for which the distance of two balls is known without any solver."""
+    arm, post = planar_arm(), ball("world/post", WORLD, 0.1, (1.0, 1.5, 0.0))
+    tip = ball("arm/link2/tip", "arm/link2", 0.05, (1.0, 0.0, 0.0))
+    scene = replace(arm, geometries=(tip, post), pairs=(Pair(tip.name, post.name),))
+    q = np.random.default_rng(0).uniform(-0.4, 0.4, (2000, 2))
+    ends = np.cumsum([np.stack([np.cos(a), np.sin(a)], axis=1) for a in (q[:, 0], q.sum(axis=1))], axis=0)[-1]
+    apart = np.linalg.norm(ends - (1.0, 1.5), axis=1) - 0.15
+    polytope = cube(scene, np.zeros(2), 0.2)
+    for metres, outcome in ((0.5, Outcome.CERTIFIED), (1.2, Outcome.REFUTED)):
+        away = with_conditions(scene, [Distance("away", tip.name, post.name, metres)])
+        compared = abs(apart - metres) > HAIR
+        assert (~in_collision(away, away.to_s(q)) == (apart > metres))[compared].all()
+        assert local.certify(away, polytope, cells=2000).outcome is outcome
+
+
 def test_a_scene_with_conditions_is_stored_whole(conditioned: Scene) -> None:
     document = json.loads(json.dumps(conditioned.to_document()))
     again = Scene.from_document(document)
