@@ -1,18 +1,18 @@
 """Wherever pairs that stand for a condition are apart, the condition holds: in whole numbers, with kinematics of an arm worked out here.
 
-python -m tests.oracles.test_conditions_exactly --samples 100000
+``python -m tests.oracles.test_conditions_exactly --samples 100000`` asks more than the tests do.
 """
 
 from __future__ import annotations
 
 import argparse
-import math
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import pytest
+from flint import arb, ctx
 
 from certifier.conditioned import condition_of, with_conditions
 from certifier.conditions import Condition, Cone, Distance, Inside, Range
@@ -22,7 +22,8 @@ from tests.certifier.scenes import ball, planar_arm
 
 STEPS = 1024
 """Samples are whole multiples of 1 / STEPS in s."""
-TERMS = 40
+BITS = 200
+"""Cosines of angles have this many bits."""
 HAIR = 1e-6
 """Nothing is asked of what is nearer to where a condition begins to fail, but that it is not proved where it fails."""
 TIP, RADIUS, POST = (0.75, 0.25, -0.5), 0.125, (1.5, 1.0, 0.25)
@@ -43,22 +44,10 @@ def arm() -> Scene:
     return replace(base, joints=joints, geometries=(tip, post), pairs=(Pair(tip.name, post.name),))
 
 
-def cosine(x: float) -> Fraction:
-    """Returns the cosine to much more than double precision, by its series."""
-    square, term, total = Fraction(x) ** 2, Fraction(1), Fraction(1)
-    for i in range(1, TERMS, 2):
-        term = -term * square / (i * (i + 1))
-        total += term
-    return total
-
-
-def sine(x: float) -> Fraction:
-    """Returns the sine to much more than double precision, by its series."""
-    square, term, total = Fraction(x) ** 2, Fraction(x), Fraction(x)
-    for i in range(2, TERMS, 2):
-        term = -term * square / (i * (i + 1))
-        total += term
-    return total
+def number(found: arb) -> Fraction:
+    """Returns the middle of a ball, whose radius is far below what doubles round with BITS."""
+    mantissa, exponent = found.mid().man_exp()
+    return int(mantissa) * Fraction(2) ** int(exponent)
 
 
 def pose(steps: list[int]) -> tuple[Any, list[Fraction]]:
@@ -79,13 +68,13 @@ def dot(a: Any, b: Any) -> Fraction:
 
 
 def room(kind: str, steps: list[int]) -> Fraction:
-    """Returns a number that is positive where the condition holds, exactly but for the series."""
+    """Returns a number that is positive where the condition holds: exact, but for the cosines of its angles."""
     condition = CONDITIONS[kind]
     R, center = pose(steps)
     match condition:
         case Cone():
             turned = [dot(row, condition.axis) for row in R]
-            return dot(turned, condition.along) - cosine(condition.angle)
+            return dot(turned, condition.along) - number(arb(condition.angle).cos())
         case Inside():
             return min(d - Fraction(RADIUS) - dot(center, normal) for *normal, d in [map(Fraction, face) for face in condition.faces])
         case Distance():
@@ -98,33 +87,35 @@ def room(kind: str, steps: list[int]) -> Fraction:
                 c, s = Fraction(STEPS**2 - k**2, one), Fraction(2 * sign * k * STEPS, one)
                 re, im = re * c - im * s, re * s + im * c
             middle, half = (condition.lower + condition.upper) / 2, (condition.upper - condition.lower) / 2
-            return re * cosine(middle) + im * sine(middle) - cosine(half)
+            return re * number(arb(middle).cos()) + im * number(arb(middle).sin()) - number(arb(half).cos())
     raise AssertionError(kind)
 
 
 def compare(kind: str, samples: int, proved: Condition | None = None) -> tuple[int, int, int]:
     """Returns how many samples keep the condition, how many do not, and how many are too near to ask whether they are proved.
 
-    Half of the samples are moved to where the condition nearly begins to fail.
+    Half of the samples are neighbours, a step or less from each other in each coordinate: the pairs touch at one of them alone.
 
     Args:
         proved: another condition, which the pairs prove in its place.
     """
     scene = with_conditions(arm(), [proved or CONDITIONS[kind]])
-    standing = tuple(pair for pair in scene.pairs if condition_of(scene, pair) is not None) or scene.pairs
-    steps = np.random.default_rng(0).integers(-STEPS // 2, STEPS // 2 + 1, (samples, 3))
-    lone = replace(scene, pairs=standing)
-    low, high = steps[: samples // 4].copy(), steps[samples // 4 : 2 * (samples // 4)].copy()
-    first = in_collision(lone, low / STEPS)
-    for _ in range(int(math.log2(STEPS)) + 1):
+    lone = replace(scene, pairs=tuple(pair for pair in scene.pairs if condition_of(scene, pair)) or scene.pairs)
+    rng = np.random.default_rng(0)
+    steps = rng.integers(-STEPS // 2, STEPS // 2 + 1, (samples // 2, 3))
+    touching = in_collision(lone, steps / STEPS)
+    low, high = (rng.choice(steps[side], samples // 4) for side in (touching, ~touching))
+    for _ in range(STEPS.bit_length()):
         middle = (low + high) // 2
-        same = in_collision(lone, middle / STEPS) == first
+        same = in_collision(lone, middle / STEPS)
         low[same], high[~same] = middle[same], middle[~same]
-    steps = np.concatenate([steps[2 * (samples // 4) :], low, high])
+    assert abs(low - high).max() <= 1
+    steps = np.concatenate([steps, low, high])
     kept = ~in_collision(lone, steps / STEPS)
     holds = fails = near = 0
     for at, apart in zip(steps.tolist(), kept.tolist(), strict=True):
-        left = room(kind, at)
+        with ctx.workprec(BITS):
+            left = room(kind, at)
         assert left > 0 or not apart, f"{kind}: proved at {at} / {STEPS}, where it fails by {float(left)}"
         near += abs(left) <= HAIR
         assert apart or left <= HAIR, f"{kind}: not proved at {at} / {STEPS}, where it holds by {float(left)}"
