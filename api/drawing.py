@@ -3,30 +3,36 @@
 from __future__ import annotations
 
 import hashlib
+from contextlib import suppress
 from threading import Lock
 
 import numpy as np
 from cachetools import LRUCache, cached
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from api import checks
 from api.schemas.drawing import (
     MAX_REGIONS,
     Contacts,
+    DrawnCone,
     DrawnGeometry,
     DrawnJoint,
+    DrawnZone,
     SceneModel,
     SliceAxis,
     SlicedRegion,
     SliceRequest,
     SliceResponse,
 )
-from certifier.conditions import of_condition
+from certifier.broken import trouble
+from certifier.conditioned import zone_reach
+from certifier.conditions import Cone, Inside, of_condition
 from certifier.errors import RegionError
 from certifier.isolation.child import run_in_child
-from certifier.model import Array, Geometry, Scene
+from certifier.model import Array, Geometry, Polytope, Scene
 from certifier.pair.collisions import contacts as contacts_at
+from certifier.polytopes.polytope import chebyshev_center
 from db.settings import settings
 from planner.library import Library
 from planner.membership import locate, to_s
@@ -67,6 +73,8 @@ def model(scene_id: str, scene: Scene) -> SceneModel:
         padding=scene.padding,
         geometries=[_drawn(geometry) for geometry in scene.geometries],
         pairs=[(index[pair.a], index[pair.b]) for pair in scene.pairs],
+        zones=[_zone(scene, condition) for condition in scene.conditions if isinstance(condition, Inside)],
+        cones=[_cone(condition) for condition in scene.conditions if isinstance(condition, Cone)],
     )
 
 
@@ -80,6 +88,21 @@ def _drawn(geometry: Geometry) -> DrawnGeometry:
         triangles=triangles(geometry.vertices).tolist() if shown else [],
         substitution=geometry.substitution,
     )
+
+
+def _zone(scene: Scene, condition: Inside) -> DrawnZone:
+    sides, reach = np.concatenate([np.eye(3), -np.eye(3)]), zone_reach(scene, condition)
+    faces = np.concatenate([condition.faces, np.column_stack([sides, np.full(6, reach)])])
+    vertices = np.zeros((0, 3))
+    with suppress(RegionError):  # Nothing is in the zone, or it is flat.
+        middle, _ = chebyshev_center(Polytope(faces[:, :3], faces[:, 3]))
+        vertices = HalfspaceIntersection(faces * [1, 1, 1, -1], middle).intersections
+    return DrawnZone(condition=condition.name, of=condition.of, vertices=vertices.tolist(), triangles=triangles(vertices).tolist())
+
+
+def _cone(condition: Cone) -> DrawnCone:
+    axis, along = list(condition.axis), list(condition.along)
+    return DrawnCone(condition=condition.name, body=condition.body, axis=axis, of=condition.of, along=along, angle=condition.angle)
 
 
 def triangles(vertices: Array) -> NDArray[np.intp]:
@@ -104,11 +127,12 @@ def contacts(scene: Scene, q: Array) -> list[Contacts]:
     shifted = scene.in_windows(q)
     covered = np.all(scene.has_s(shifted), axis=1)
     touching = iter(contacts_at(scene, scene.to_s(shifted[covered])))
-    names = [joint.name for joint in scene.moving]
-    return [
-        Contacts(pairs=next(touching) if known else None, outside=[name for name, out in zip(names, row, strict=True) if out])
-        for known, row in zip(covered.tolist(), beyond.tolist(), strict=True)
-    ]
+    found = []
+    for at, known, out in zip(q, covered.tolist(), beyond, strict=True):
+        outside, pairs = [scene.moving[i].name for i in np.flatnonzero(out).tolist()], next(touching) if known else None
+        words = [f"the joint {joint} is beyond its limits" for joint in outside] + [trouble(scene, scene.pairs[i], at) for i in pairs or []]
+        found.append(Contacts(pairs=pairs, outside=outside, trouble=list(dict.fromkeys(words))))
+    return found
 
 
 def _pixels(scene: Scene, q: Array) -> tuple[str, bytes]:

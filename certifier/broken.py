@@ -6,10 +6,13 @@ import math
 
 import numpy as np
 
-from certifier.conditioned import condition_of
-from certifier.conditions import Cone, Inside, Range
+from certifier.collisions.free import distance_at
+from certifier.collisions.seen import seen_of
+from certifier.conditioned import condition_of, distance_of
+from certifier.conditions import Condition, Cone, Distance, Inside, Range
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Pair, Scene
+from certifier.motion.bodies import bodies_of
 
 
 def trouble(scene: Scene, pair: Pair, q: Array | None = None) -> str:
@@ -18,27 +21,51 @@ def trouble(scene: Scene, pair: Pair, q: Array | None = None) -> str:
     Args:
         q: (n,) where, radians or metres; None where only the pair is known.
     """
-    condition = condition_of(scene, pair)
-    if condition is None:
-        return f"{pair.a} and {pair.b} touch"
-    by = ""
-    if q is not None:
-        s, kinematics = scene.to_s(scene.in_windows(q))[None], Kinematics.of(scene)
-        match condition:
-            case Cone():
-                ends = kinematics.points(condition.of, condition.body, np.array([condition.axis, [0.0, 0.0, 0.0]]), s)[0]
-                angle = math.acos(float(np.clip((ends[0] - ends[1]) @ condition.along, -1.0, 1.0)))
-                by = f": the angle is {math.degrees(angle):.4g} degrees, and {math.degrees(condition.angle):.9g} at most"
-            case Range():
-                place = {joint.name: joint.index or 0 for joint in scene.moving}
-                total = sum(sign * q[place[name]] for name, sign in condition.joints)
-                middle, half = (condition.lower + condition.upper) / 2, (condition.upper - condition.lower) / 2
-                beyond = abs(math.remainder(total - middle, 2 * math.pi)) - half
-                by = f": the sum of the angles is {math.degrees(beyond):.4g} degrees beyond its range"
-            case Inside():
-                geometry = scene.geometry(pair.a if pair.a in condition.geometries else pair.b)
-                faces = np.array(condition.faces)
-                points = kinematics.points(condition.of, geometry.body, geometry.vertices, s)[0]
-                beyond = float((points @ faces[:, :3].T - faces[:, 3]).max()) + geometry.radius
-                by = f": {geometry.name} reaches {1000 * beyond:.4g} mm beyond the zone"
+    return not_kept(scene, pair, q) or f"{pair.a} and {pair.b} touch"
+
+
+def not_kept(scene: Scene, pair: Pair, q: Array | None = None) -> str | None:
+    """Returns in words that the condition that a pair proves is not kept; None for two bodies that touch.
+
+    Args:
+        q: (n,) where, radians or metres; None where only the pair is known.
+    """
+    condition = condition_of(scene, pair) or distance_of(scene, pair)
+    if condition is None or (isinstance(condition, Distance) and (q is None or _apart(scene, pair, q) <= 0)):
+        return None
+    by = "" if q is None else f": {_by(scene, pair, condition, q)}"
     return f"the condition '{condition.name}' is not kept{by}"
+
+
+def _by(scene: Scene, pair: Pair, condition: Condition, q: Array) -> str:
+    """Returns in words by how much a condition is not kept at q, (n,)."""
+    s, kinematics = scene.to_s(scene.in_windows(q))[None], Kinematics.of(scene)
+    match condition:
+        case Cone():
+            ends = kinematics.points(condition.of, condition.body, np.array([condition.axis, [0.0, 0.0, 0.0]]), s)[0]
+            angle = math.acos(float(np.clip((ends[0] - ends[1]) @ condition.along, -1.0, 1.0)))
+            return f"the angle is {math.degrees(angle):.4g} degrees, and {math.degrees(condition.angle):.9g} at most"
+        case Range():
+            place = {joint.name: joint.index or 0 for joint in scene.moving}
+            total = sum(sign * q[place[name]] for name, sign in condition.joints)
+            middle, half = (condition.lower + condition.upper) / 2, (condition.upper - condition.lower) / 2
+            beyond = abs(math.remainder(total - middle, 2 * math.pi)) - half
+            return f"the sum of the angles is {math.degrees(beyond):.4g} degrees beyond its range"
+        case Inside():
+            geometry = scene.geometry(pair.a if pair.a in condition.geometries else pair.b)
+            faces = np.array(condition.faces)
+            points = kinematics.points(condition.of, geometry.body, geometry.vertices, s)[0]
+            beyond = float((points @ faces[:, :3].T - faces[:, 3]).max()) + geometry.radius
+            return f"{geometry.name} reaches {1000 * beyond:.4g} mm beyond the zone"
+        case Distance():
+            return f"{pair.a} and {pair.b} are {_apart(scene, pair, q):.4g} m apart, and {condition.metres:.9g} at least"
+
+
+def _apart(scene: Scene, pair: Pair, q: Array) -> float:
+    """Returns how far the two bodies of a pair are apart at q, (n,), in metres, without their padding; 0 or less where they touch."""
+    bodies = bodies_of(scene)
+    links = len(bodies.parents)
+    padded = distance_at(
+        bodies, seen_of(scene), scene.pairs.index(pair), scene.in_windows(q), np.empty((links, 3, 3)), np.empty((links, 3))
+    )
+    return float(padded + 2 * scene.padding_of(pair))

@@ -166,6 +166,12 @@ def condition_of(scene: Scene, pair: Pair) -> Condition | None:
     return next((condition for condition in scene.conditions if condition.name == name), None)
 
 
+def distance_of(scene: Scene, pair: Pair) -> Distance | None:
+    """Returns the condition with the largest distance that the two bodies of a pair have to keep; None where there is none."""
+    kept = [one for one in scene.conditions if isinstance(one, Distance) and frozenset((pair.a, pair.b)) in _between(scene, one)]
+    return max(kept, key=lambda one: one.metres, default=None)
+
+
 def called(scene: Scene, pair: Pair) -> str:
     """Returns what messages call a pair: its geometries, or the condition that it proves."""
     condition = condition_of(scene, pair)
@@ -244,7 +250,7 @@ class _Parts:
         geometries = [scene.geometry(name) for name in condition.geometries]
         for geometry in geometries:
             _check_way(condition, scene.joints, geometry.body, condition.of, f"{geometry.name} does not move against {condition.of}")
-        reach = max(_reach(scene, geometry, condition.of) for geometry in geometries)
+        reach = zone_reach(scene, condition)
         for i, (*normal, offset) in enumerate(condition.faces):
             if offset >= reach:
                 continue  # No geometry reaches this face.
@@ -254,9 +260,7 @@ class _Parts:
             self.pairs += [Pair(*sorted((name, geometry.name)), padding=0.0) for geometry in geometries]
 
     def _distance(self, condition: Distance) -> None:
-        scene = self.scene
-        sides = [{g.name for g in scene.geometries if name in (g.name, g.body, g.shape.get("of"))} for name in (condition.a, condition.b)]
-        between = {frozenset((a, b)) for a in sides[0] for b in sides[1]}
+        scene, between = self.scene, _between(self.scene, condition)
         kept = {frozenset((pair.a, pair.b)) for pair in scene.pairs}
         missing = next(iter(sorted(tuple(sorted(names)) for names in between - kept)), None)
         if missing is not None or not between:
@@ -269,6 +273,12 @@ class _Parts:
             else pair
             for pair in self.padded
         ]
+
+
+def _between(scene: Scene, condition: Distance) -> set[frozenset[str]]:
+    """Returns the names of the two geometries of each pair that has to keep a distance."""
+    sides = [{g.name for g in scene.geometries if name in (g.name, g.body, g.shape.get("of"))} for name in (condition.a, condition.b)]
+    return {frozenset((a, b)) for a in sides[0] for b in sides[1]}
 
 
 def _slab(normal: Array, begin: float, depth: float, lateral: float) -> Array:
@@ -317,6 +327,11 @@ def _check_way(condition: Condition, joints: Iterable[Joint], body: str, of: str
     slides = len(moving) == 2 and all(joint.kind is JointKind.PRISMATIC for joint in moving)
     if len({joint.index for joint in moving}) < len(moving) and not slides:
         raise _wrong(condition, f"joints that move together are between {body} and {of}")
+
+
+def zone_reach(scene: Scene, condition: Inside) -> float:
+    """Returns a distance in metres from the origin of a zone's body that no point of its geometries exceeds."""
+    return max(_reach(scene, scene.geometry(name), condition.of) for name in condition.geometries)
 
 
 def _reach(scene: Scene, geometry: Geometry, of: str) -> float:

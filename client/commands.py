@@ -23,6 +23,8 @@ from client.request import refuse_of_service, request
 from client.seeds import place_of_seed, seed_of
 
 OK, NO = 0, 1
+AT_ONCE = 100
+"""The service says of at most this many configurations at a time what is wrong there."""
 
 
 def up(args: Namespace) -> int:
@@ -292,7 +294,13 @@ def contains(args: Namespace) -> int:
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)
         answer = client.contains(scene["id"], points)
-    inside = all(point["inside"] for point in answer["points"])
+        outside = [(q, point) for q, point in zip(points, answer["points"], strict=True) if not point["inside"]]
+        for i in range(0, len(outside), AT_ONCE):
+            some = outside[i : i + AT_ONCE]
+            contacts = client.contacts(scene["id"], [q for q, _ in some])["contacts"]
+            for (_, point), contact in zip(some, contacts, strict=True):
+                point["trouble"] = contact["trouble"]
+    inside = not outside
     if args.json:
         print_json(answer)
         return OK if inside else NO
@@ -305,7 +313,8 @@ def contains(args: Namespace) -> int:
             print(f"inside: {where} in {'; '.join(proofs)}")
         else:
             mapped = "" if point["map"] is None else ", nor does the map prove it free"
-            print(f"outside: {where} is in none of {answer['regions']} regions{mapped}")
+            trouble = ": " + "; ".join(point["trouble"]) if point["trouble"] else ", though floating point finds nothing wrong there"
+            print(f"outside: {where} is in none of {answer['regions']} regions{mapped}{trouble}")
     return OK if inside else NO
 
 

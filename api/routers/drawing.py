@@ -19,7 +19,7 @@ router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ]
 
 @router.post("/contacts")
 def find_contacts(body: ContactsRequest, db: Db) -> ContactsResponse:
-    """Says which pairs touch at configurations, and which joints are outside of their limits.
+    """Says what is wrong at configurations: which pairs touch, which joints are outside of their limits, which conditions are not kept.
 
     This is computed in floating point, for looking at a robot and for choosing a seed. It certifies nothing.
     """

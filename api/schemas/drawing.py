@@ -47,6 +47,26 @@ class DrawnGeometry(BaseModel):
     substitution: str | None = Field(description="Says how the body differs from the robot file's, where it is a conservative replacement.")
 
 
+class DrawnZone(BaseModel):
+    """Describes the zone of a condition of the kind `inside`, as far as the robot can reach."""
+
+    condition: str = Field(description="Name of the condition.", examples=["over-the-table"])
+    of: str = Field(description="Name of the body in whose frame the zone is.")
+    vertices: list[list[float]] = Field(description="(v, 3), metres, in that frame; none where nothing is in the zone.")
+    triangles: list[list[int]] = Field(description="Corners of the zone's triangles, anticlockwise seen from outside.")
+
+
+class DrawnCone(BaseModel):
+    """Describes a condition of the kind `cone`: the direction `axis` of a body stays within an angle of the direction `along`."""
+
+    condition: str = Field(description="Name of the condition.", examples=["upright"])
+    body: str = Field(description="Name of the body whose direction stays in the cone.")
+    axis: list[float] = Field(description="(3,), a direction in the frame of that body.")
+    of: str = Field(description="Name of the body in whose frame the cone is.")
+    along: list[float] = Field(description="(3,), the middle of the cone, in that frame.")
+    angle: float = Field(description="Radians between the middle of the cone and its surface.")
+
+
 class SceneModel(BaseModel):
     """Describes a scene as it is drawn: what is drawn is what is certified."""
 
@@ -61,6 +81,8 @@ class SceneModel(BaseModel):
     padding: float = Field(description="Metres added around both geometries of every pair that has no padding of its own.")
     geometries: list[DrawnGeometry] = Field(description="The convex bodies that are certified.")
     pairs: list[tuple[int, int]] = Field(description="Indices of the geometries of every pair to certify, in the order of the pairs.")
+    zones: list[DrawnZone] = Field(description="The zones in which geometries have to stay.")
+    cones: list[DrawnCone] = Field(description="The cones in which directions of bodies have to stay.")
 
 
 class ContactsRequest(Request):
@@ -83,6 +105,11 @@ class Contacts(BaseModel):
         examples=[[3]],
     )
     outside: list[str] = Field(description="The joints that are outside of their limits.", examples=[[]])
+    trouble: list[str] = Field(
+        description="In words, what is wrong there: joints beyond their limits, bodies that touch, and by how much which conditions of "
+        "the scene are not kept.",
+        examples=[["the condition 'upright' is not kept: the angle is 21.2 degrees, and 15 at most"]],
+    )
 
 
 class ContactsResponse(BaseModel):

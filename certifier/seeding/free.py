@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.geometry import QueryObject
 
-from certifier.broken import trouble
-from certifier.conditioned import condition_of
+from certifier.broken import not_kept
 from certifier.errors import RegionError
 from certifier.model import Array, Pair, Scene
 from certifier.scene.drake_model import InDrake, build_diagram, geometry_name
@@ -104,14 +103,15 @@ def check_free(scene: Scene, q: Array, field: str) -> Nearest:
     distance += 2 * padding
     searched = ((room, nearest_free(scene, clearance, scene.in_windows(q), room)) for room in ROOM)
     room, found = next((one for one in searched if one[1] is not None), (0.0, None))
-    if condition_of(scene, pair) is None:
+    condition = not_kept(scene, pair, q)
+    if condition is None:
         overlap = f"overlap by {-distance:.3g} m" if np.isfinite(distance) else "overlap"
         how = overlap if distance <= 0 else f"are {distance:.3g} m apart, with a padding of {padding:g} m on each"
         message, hint = f"{pair.a} and {pair.b} {how}", "move the seed, or ignore the pair in the scene"
         if distance <= 0:
             message += _hollow(scene, pair)
     else:
-        message, hint = trouble(scene, pair, q), "move the seed, or change the condition"
+        message, hint = condition, "move the seed, or change the condition"
     if found is not None:
         hint = _said(scene, scene.in_windows(q), found, written(clearance, found, room))
     raise RegionError("seed_in_collision", message, field=field, hint=hint)

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from certifier.broken import trouble
-from certifier.conditioned import condition_of
+from certifier.broken import not_kept
 from certifier.model import Array, Scene
 from certifier.seeding.free import ROOM, Clearance, nearest_free
 
@@ -61,8 +60,7 @@ def in_collision(scene: Scene, q: Array) -> InCollision:
     distance, pair = clearance.least(q)
     searched = (nearest_free(scene, clearance, scene.in_windows(q), room) for room in ROOM)
     free = next((found for found in searched if found is not None), None)
-    broken = None if condition_of(scene, pair) is None else trouble(scene, pair, q)
-    return InCollision(pair.a, pair.b, -distance if np.isfinite(distance) else None, free, broken)
+    return InCollision(pair.a, pair.b, -distance if np.isfinite(distance) else None, free, not_kept(scene, pair, q))
 
 
 def turned(scene: Scene, start: Array, goal: Array) -> list[Array]:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from certifier.conditioned import with_conditions
+from api import drawing
+from certifier.conditioned import with_conditions, without_conditions, zone_reach
 from certifier.conditions import Cone, Inside
 from certifier.model import WORLD, Scene
 from db import scenes
@@ -41,6 +42,29 @@ def test_a_scene_is_described_with_its_conditions_and_without_what_stands_for_th
     assert len(model["pairs"]) == len(upright.pairs)
 
 
+def test_a_model_has_the_zones_and_the_cones(client: TestClient, upright: Scene) -> None:
+    model = client.get("/v1/scenes/planar/model").json()
+    cone, below = upright.conditions
+    assert isinstance(cone, Cone)
+    assert isinstance(below, Inside)
+    drawn = {"condition": "along-x", "body": "arm/link2", "axis": [1, 0, 0], "of": "world", "along": [1, 0, 0], "angle": cone.angle}
+    assert model["cones"] == [drawn]
+    (zone,) = model["zones"]
+    assert (zone["condition"], zone["of"]) == ("below", "world")
+    vertices, reach = np.array(zone["vertices"]), zone_reach(upright, below)
+    # The half-space y <= 1.2 within the cube that the arm can reach.
+    assert vertices.min(axis=0) == pytest.approx([-reach] * 3)
+    assert vertices.max(axis=0) == pytest.approx([reach, 1.2, reach])
+    volume = sum(np.linalg.det(vertices[t]) for t in zone["triangles"]) / 6
+    assert volume == pytest.approx(4 * reach**2 * (reach + 1.2))
+
+
+def test_a_zone_with_nothing_in_it_is_drawn_as_nothing(upright: Scene) -> None:
+    empty = Inside("nowhere", ("arm/link2/bar",), WORLD, ((0.0, 1.0, 0.0, -0.2), (0.0, -1.0, 0.0, 0.1)))
+    (zone,) = drawing.model("0", with_conditions(without_conditions(upright), [empty])).zones
+    assert (zone.vertices, zone.triangles) == ([], [])
+
+
 def test_a_motion_keeps_the_conditions_or_says_which_is_not_kept(client: TestClient, upright: Scene) -> None:
     asked = {"scene": "planar", "start": [0.0, 0.0], "seconds": 1.0}
     found = client.post("/v1/planning/plan", json={**asked, "goal": [0.5, -0.5]}).json()
@@ -53,3 +77,4 @@ def test_a_motion_keeps_the_conditions_or_says_which_is_not_kept(client: TestCli
     contacts = client.post("/v1/planning/contacts", json={"scene": "planar", "q": [[-0.6, -0.6]]}).json()["contacts"]
     names = {name for pair in contacts[0]["pairs"] for name in (upright.pairs[pair].a, upright.pairs[pair].b)}
     assert "conditions/along-x/direction" in names
+    assert "the condition 'along-x' is not kept: the angle is 68.75 degrees, and 60 at most" in contacts[0]["trouble"]

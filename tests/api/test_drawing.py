@@ -54,6 +54,8 @@ def test_contacts_are_those_of_the_pairs_one_at_a_time(client: TestClient, plana
     alone = [in_collision(replace(planar, pairs=(pair,)), planar.to_s(q)) for pair in planar.pairs]
     assert [contact["pairs"] for contact in found] == [[i for i, touches in enumerate(alone) if touches[k]] for k in range(100)]
     assert 0 < sum(bool(contact["pairs"]) for contact in found) < 100
+    named = [[planar.pairs[i] for i in contact["pairs"]] for contact in found]
+    assert [contact["trouble"] for contact in found] == [[f"{pair.a} and {pair.b} touch" for pair in pairs] for pairs in named]
     assert not any(contact["outside"] for contact in found)
 
 
@@ -62,6 +64,8 @@ def test_contacts_say_which_joint_is_outside_of_its_limits(client: TestClient, p
     near, far = client.post("/v1/planning/contacts", json=body).json()["contacts"]
     assert (near["outside"], near["pairs"] is None) == (["arm/joint1"], False)
     assert (far["outside"], far["pairs"]) == (["arm/joint2"], None)
+    assert "the joint arm/joint1 is beyond its limits" in near["trouble"]
+    assert far["trouble"] == ["the joint arm/joint2 is beyond its limits"]
 
 
 def test_a_slice_is_free_and_in_collision_where_the_arm_is(client: TestClient, planar: Scene, planar_region: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -253,6 +254,45 @@ def test_a_seed_is_refused_with_the_angle_or_the_distance(conditioned: Scene) ->
         with pytest.raises(RegionError, match=f"the condition '{name}' is not kept: .*{words}") as error:
             check_free(scene, np.array(q), "seed.q")
         assert error.value.code == "seed_in_collision"
+
+
+@pytest.mark.parametrize(
+    ("condition", "words", "unit"),
+    [
+        (Cone("c", "arm/link2", (1.0, 0.0, 0.0), WORLD, (0.0, 0.6, 0.8), 0.7), r"the angle is (\S+) degrees, and 40.1070457 at most$", 0.0),
+        (Range("c", (("arm/joint1", 1), ("arm/joint2", -1)), 0.2, 0.5), r"the sum of the angles is (\S+) degrees beyond its range$", 0.0),
+        (Inside("c", ("arm/link2/bar",), "arm/link1", ((0.0, 0.6, 0.8, 0.2),)), r"arm/link2/bar reaches (\S+) mm beyond the zone$", 1e-3),
+    ],
+    ids=lambda value: getattr(value, "kind", None),
+)
+def test_words_say_by_how_much_a_condition_is_not_kept(condition: Condition, words: str, unit: float) -> None:
+    scene = with_conditions(planar_arm(), [condition])
+    pair, failed = scene.pairs[-1], 0
+    for q in np.random.default_rng(0).uniform(-1.2, 1.2, (50, 2)):
+        beyond = -room(scene, condition, q)
+        if beyond > HAIR:
+            said = re.search(words, trouble(scene, pair, q))
+            assert said, trouble(scene, pair, q)
+            told = float(said[1]) * unit if unit else math.radians(float(said[1]))
+            assert told == pytest.approx(beyond + (condition.angle if isinstance(condition, Cone) else 0.0), rel=1e-3)
+            failed += 1
+    assert failed > 10
+
+
+def test_words_of_a_distance_say_how_far_the_bodies_are_apart_unless_they_touch() -> None:
+    arm, post = planar_arm(), ball("world/post", WORLD, 0.1, (1.0, 1.5, 0.0))
+    tip = ball("arm/link2/tip", "arm/link2", 0.05, (1.0, 0.0, 0.0))
+    alone = replace(arm, geometries=(tip, post), pairs=(Pair(tip.name, post.name),))
+    scene = with_conditions(alone, [Distance("away", tip.name, post.name, 0.5), Distance("far", tip.name, post.name, 0.75)])
+    (pair,), found = scene.pairs, set()
+    for q in np.random.default_rng(0).uniform(-1.2, 1.2, (300, 2)):
+        end = np.array([math.cos(q[0]) + math.cos(q.sum()), math.sin(q[0]) + math.sin(q.sum())])
+        apart = float(np.linalg.norm(end - (1.0, 1.5))) - 0.15
+        if apart < 0.75:
+            far = f"the condition 'far' is not kept: {pair.a} and {pair.b} are {apart:.4g} m apart, and 0.75 at least"
+            assert trouble(scene, pair, q) == (far if apart > 0 else f"{pair.a} and {pair.b} touch")
+            found.add(apart > 0)
+    assert found == {True, False}
 
 
 def test_a_distance_is_kept_as_padding() -> None:

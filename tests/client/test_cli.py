@@ -366,9 +366,15 @@ def test_a_region_that_was_stored_before_there_were_shares_is_shown(certified: R
 def test_contains_answers_by_its_exit_status(ciris: Ciris, url: str, region: str) -> None:
     inside = ciris("contains", "slider", "--q", "-0.2", CIRIS_URL=url)
     assert (inside.status, inside.stdout.startswith(f"inside: -0.2 in {region} (margin 0.1, exact)")) == (0, True)
-    outside = ciris("contains", "slider", "--q", "0.1", "--q", "0.9", "--json", CIRIS_URL=url)
+    outside = ciris("contains", "slider", "--q", "0.1", "--q", "0.9", "--q", "5", "--json", CIRIS_URL=url)
     assert outside.status == 1
-    assert [point["inside"] for point in outside.json["points"]] == [True, False]
+    assert [point["inside"] for point in outside.json["points"]] == [True, False, False]
+    assert [point.get("trouble") for point in outside.json["points"]] == [None, [], ["the joint model/slide is beyond its limits"]]
+    told = ciris("contains", "slider", *["--q=0.9"] * 101, "--q=5", CIRIS_URL=url).stdout.splitlines()
+    assert told == [
+        *["outside: 0.9 is in none of 1 regions, though floating point finds nothing wrong there"] * 101,
+        "outside: 5 is in none of 1 regions: the joint model/slide is beyond its limits",
+    ]
     wrong = ciris("contains", "slider", "--q", "0,1", CIRIS_URL=url)
     assert (wrong.status, wrong.error.startswith("--q[0]: 2 numbers were given")) == (2, True)
 

@@ -85,7 +85,7 @@ def test_what_touches_is_said_as_the_robot_moves(opened: Any) -> None:
     opened.get_by_role("spinbutton", name="arm/joint1, degrees, as a number").fill("30")
     opened.get_by_role("spinbutton", name="arm/joint2, degrees, as a number").fill("15")
     opened.get_by_role("spinbutton", name="arm/joint2, degrees, as a number").press("Enter")
-    opened.get_by_text("In collision: arm/link2/bar and world/obstacle").wait_for()
+    opened.get_by_text("Not free: arm/link2/bar and world/obstacle touch").wait_for()
 
 
 def test_a_plan_is_played_to_its_end_with_the_region_of_each_moment(opened: Any, regions: list[str], tmp_path: Path) -> None:

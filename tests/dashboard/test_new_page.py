@@ -74,7 +74,7 @@ def test_the_robot_takes_a_named_configuration_and_keeps_the_joints_that_it_leav
 def test_what_touches_is_said_live_and_no_job_starts_there(opened: Any, client: TestClient) -> None:
     set_joint(opened, "arm/joint1", 30)
     set_joint(opened, "arm/joint2", 15)
-    opened.get_by_text("In collision: arm/link2/bar and world/obstacle").wait_for()
+    opened.get_by_text("Not free: arm/link2/bar and world/obstacle touch").wait_for()
     opened.get_by_role("button", name="Start the job").click()
     opened.get_by_text("no region can hold the configuration").wait_for()
     assert jobs(client) == []

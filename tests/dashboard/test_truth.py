@@ -43,7 +43,7 @@ def test_nothing_is_said_of_a_configuration_that_was_not_asked_about(page: Any, 
     slow.clear()
     for one in held:
         one.continue_()
-    page.get_by_text("In collision: arm/link2/bar and world/obstacle").wait_for()
+    page.get_by_text("Not free: arm/link2/bar and world/obstacle touch").wait_for()
 
 
 def test_nothing_is_said_of_a_slice_that_is_not_there_yet(page: Any, url: str, planar_region: str) -> None:
@@ -108,7 +108,7 @@ def test_answers_out_of_order_and_lost_ones_leave_the_last_word_to_the_end(
 
 
 def test_a_configuration_of_which_nothing_is_known_is_not_said_to_be_free(page: Any, url: str, planar: Scene) -> None:
-    answer = {"scene": planar.hash[:16], "contacts": [{"pairs": None, "outside": []}]}
+    answer = {"scene": planar.hash[:16], "contacts": [{"pairs": None, "outside": [], "trouble": []}]}
     page.route("**/v1/planning/contacts", lambda route: route.fulfill(json=answer))
     page.goto(f"{url}/new?scene=planar&q=0.1,-0.2")
     page.get_by_text("Not known here: a joint is half a turn away from q*.").wait_for()

@@ -106,3 +106,8 @@ export function positions(model: SceneModel): string[] {
 export function asText(q: number[], units: ("rad" | "m")[]): string {
   return q.map((value, i) => (units[i] === "rad" ? ((value * 180) / Math.PI).toFixed(1) : value.toFixed(3))).join(", ");
 }
+
+/** Whether a geometry stands for a condition of the scene. */
+export function ofCondition(name: string): boolean {
+  return name.startsWith("conditions/");
+}

@@ -7,8 +7,8 @@ import type { ContactsResponse, ContainsResponse, Near, NearestResponse, SceneMo
 export interface Moment {
   /** Indices of the pairs that touch; null where that is not known, undefined before the answer. */
   pairs?: number[] | null;
-  /** Joints that are outside of their limits, by name. */
-  outside: string[];
+  /** All that is wrong, in words. */
+  trouble: string[];
   regions: string[];
   /** The proved motions whose tubes hold it. */
   motions: string[];
@@ -19,7 +19,7 @@ export interface Moment {
 }
 
 const AGAIN_MS = 2000;
-const NOTHING: Moment = { outside: [], regions: [], motions: [], map: null, nearest: null, problem: null };
+const NOTHING: Moment = { trouble: [], regions: [], motions: [], map: null, nearest: null, problem: null };
 
 async function ask(scene: string, q: number[]): Promise<Moment> {
   const body = { scene, q: [q] };
@@ -27,14 +27,14 @@ async function ask(scene: string, q: number[]): Promise<Moment> {
     post<ContactsResponse>("/v1/planning/contacts", body),
     post<ContainsResponse>("/v1/planning/contains", body),
   ]);
-  const { pairs, outside } = touching.contacts[0]!;
+  const { pairs, outside, trouble } = touching.contacts[0]!;
   const { inside, motions, map } = containing.points[0]!;
   const regions = containing.points[0]!.regions.map(({ region }) => region);
   let nearest: Moment["nearest"] = null;
   if (!inside && containing.regions > 0 && outside.length === 0) {
     nearest = (await post<NearestResponse>("/v1/planning/nearest", body)).points[0]!.nearest;
   }
-  return { pairs, outside, regions, motions, map: map ? containing.map : null, nearest, problem: null };
+  return { pairs, trouble, regions, motions, map: map ? containing.map : null, nearest, problem: null };
 }
 
 /** Asks about one configuration at a time, then about the latest; where the service does not answer, again. */
@@ -78,26 +78,14 @@ export function touchingOf(model: SceneModel, moment: Moment): number[] {
   return [...new Set((moment.pairs ?? []).flatMap((pair) => model.pairs[pair] ?? []))];
 }
 
-/** Whether a geometry stands for a condition of the scene. */
-export function ofCondition(name: string): boolean {
-  return name.startsWith("conditions/");
-}
-
 /** Says in words what is known of the configuration, and how surely. */
-export function MomentText({ model, moment }: { model: SceneModel; moment: Moment }) {
-  const { pairs, outside, regions, motions, map, nearest, problem } = moment;
-  const both = (pairs ?? []).map((pair) => model.pairs[pair]!.map((i) => model.geometries[i]!.name));
-  const names = both.filter((two) => !two.some(ofCondition)).map((two) => two.join(" and "));
-  const broken = [...new Set(both.flatMap((two) => two.filter(ofCondition).slice(0, 1)).map((name) => name.split("/")[1]!))];
+export function MomentText({ moment }: { moment: Moment }) {
+  const { pairs, trouble, regions, motions, map, nearest, problem } = moment;
   return (
     <p class="said" role="status">
-      {problem ? <span class="bad">{problem}</span> : pairs === undefined ? "…" : outside.length ? (
-        <span class="bad">Outside of the limits: {outside.join(", ")}.</span>
-      ) : pairs === null ? "Not known here: a joint is half a turn away from q*." : names.length ? (
-        <span class="bad">In collision: {names.slice(0, 3).join("; ")}{names.length > 3 && `; and ${names.length - 3} more pairs`}.</span>
-      ) : broken.length ? (
-        <span class="bad">Not kept: the condition{broken.length > 1 && "s"} {broken.join(", ")}.</span>
-      ) : regions.length ? (
+      {problem ? <span class="bad">{problem}</span> : pairs === undefined ? "…" : trouble.length ? (
+        <span class="bad">Not free: {trouble.slice(0, 3).join("; ")}{trouble.length > 3 && `; and ${trouble.length - 3} more`}.</span>
+      ) : pairs === null ? "Not known here: a joint is half a turn away from q*." : regions.length ? (
         <span class="good">In {regions.length === 1 ? "a certified region" : `${regions.length} certified regions`}: {regions.slice(0, 4).map((region, i) => <>{i > 0 && ", "}<a href={`/regions/${region}`} key={region}>{region.slice(0, 8)}</a></>)}. No collision of the scene's pairs, as proved.</span>
       ) : motions.length ? (
         <span class="good">In the tube of the proved motion {motions[0]!.slice(0, 8)}. No collision of the scene's pairs, as proved.</span>

@@ -3,7 +3,8 @@ import * as three from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { ConvexGeometry } from "three/examples/jsm/geometries/ConvexGeometry.js";
 import { CONTACT, LINKS, onScheme, token } from "./colours";
-import { movingBodies, poses, type Matrix } from "./kinematics";
+import { movingBodies, ofCondition, poses, type Matrix } from "./kinematics";
+import { Limits } from "./limits";
 import { pulled } from "./pull";
 import type { DrawnGeometry, SceneModel } from "./schema";
 
@@ -62,6 +63,8 @@ export class View {
   private readonly grid: three.GridHelper;
   private readonly observer: ResizeObserver;
   private readonly forgetScheme: () => void;
+  private limits: Limits | null = null; // until the size of the robot is known
+  private reach = 1; // metres
   private ghosts: three.InstancedMesh[] = [];
   private home = { position: new three.Vector3(), target: new three.Vector3() };
   private asked = 0;
@@ -95,6 +98,8 @@ export class View {
     this.scene.add(sun);
     this.setPose(model.q_star);
     this.grid = this.frame();
+    this.limits = new Limits(this.scene, model, this.reach);
+    this.setPose(model.q_star);
     this.colour([]);
     this.forgetScheme = onScheme(() => this.colour(this.touching));
     this.observer = new ResizeObserver(() => this.resize());
@@ -107,7 +112,7 @@ export class View {
     const box = new three.Box3();
     for (const { mesh, colour } of this.drawn) if (colour !== null) box.expandByObject(mesh);
     const sphere = box.getBoundingSphere(new three.Sphere());
-    const reach = Math.max(sphere.radius, 0.1);
+    const reach = (this.reach = Math.max(sphere.radius, 0.1));
     this.home.target.copy(sphere.center);
     this.home.position.copy(sphere.center).add(new three.Vector3(1.6, -2.4, 1.3).multiplyScalar(1.25 * reach));
     this.camera.near = reach / 100;
@@ -187,6 +192,7 @@ export class View {
       mesh.matrix.copy(toMatrix4(found.get(geometry.body)!));
       mesh.matrixWorldNeedsUpdate = true;
     }
+    this.limits?.setPose(found);
     this.draw();
   }
 
@@ -199,6 +205,8 @@ export class View {
       mesh.material.emissive.set(are.has(i) ? CONTACT : "#000000");
       mesh.material.emissiveIntensity = are.has(i) ? 0.35 : 0;
     });
+    const names = touching.map((i) => this.model.geometries[i]!.name).filter(ofCondition);
+    this.limits?.colour(new Set(names.map((name) => name.split("/")[1]!)), token("--good"), CONTACT);
     this.draw();
   }
 
@@ -246,6 +254,7 @@ export class View {
     cancelAnimationFrame(this.asked);
     this.controls.dispose();
     this.grid.dispose();
+    this.limits?.dispose();
     for (const { mesh } of this.drawn) {
       mesh.geometry.dispose();
       mesh.material.dispose();

@@ -77,8 +77,8 @@ function Library({ model }: { model: SceneModel }) {
     <div class="library">
       <div class="views">
         <div>
-          <Robot model={model} q={q} onDrag={setQ} touching={touching} label={`The robot of ${model.name}${pair?.q === q ? `, with ${pair.a} and ${pair.b} painted` : touching.length ? ", in collision" : ""}`} />
-          <MomentText model={model} moment={moment} />
+          <Robot model={model} q={q} onDrag={setQ} touching={touching} label={`The robot of ${model.name}${pair?.q === q ? `, with ${pair.a} and ${pair.b} painted` : touching.length ? ", not free" : ""}`} />
+          <MomentText moment={moment} />
         </div>
         <Slice scene={model.scene} space={space} units={model.units} q={q} onPick={setQ} strongest={chosen} way={plan?.found ? plan.q : undefined} />
       </div>

@@ -121,8 +121,8 @@ function Start({ model, parts, asked }: { model: SceneModel; parts: Parts; asked
   return (
     <div class="stage">
       <div>
-        <Robot model={model} q={q} onDrag={setQ} touching={touching} label={`The robot of ${model.name}${touching.length ? ", in collision" : ""}`} />
-        <MomentText model={model} moment={moment} />
+        <Robot model={model} q={q} onDrag={setQ} touching={touching} label={`The robot of ${model.name}${touching.length ? ", not free" : ""}`} />
+        <MomentText moment={moment} />
         {unread && <p class="notice">The address does not name a configuration within the limits: {asked}. The robot stands at the nearest one, or at q*.</p>}
         <div class="card">
           <Sliders names={names} units={model.units} lower={model.q_lower} upper={model.q_upper} q={q} onChange={setQ} />

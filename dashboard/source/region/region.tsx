@@ -5,7 +5,7 @@ import { shortNames } from "../common/kinematics";
 import { contains, rooms, toQ, toS, type Faces, type Space } from "../common/polytope";
 import { Robot } from "../common/robot";
 import type { Partition, RegionConfigurations, RegionDetail, RegionPair, RegionPairs, SceneModel } from "../common/schema";
-import { ofCondition } from "../common/moment";
+import { ofCondition } from "../common/kinematics";
 import { Slice } from "../common/slice";
 import { Sliders } from "../common/sliders";
 
