@@ -37,6 +37,8 @@ LEAST_ANGLE = math.radians(0.1)
 """A cone is no narrower than this, so that ROOM does not matter."""
 MOST_FACES = 100
 """A zone has at most this many faces."""
+MOST_PAIRS = 10_000
+"""At most this many pairs stand for the conditions of a scene."""
 UNIT = 1e-12
 """The length of a direction differs from 1 by less than this."""
 TURNING = "turning"
@@ -250,6 +252,11 @@ class _Parts:
         geometries = [scene.geometry(name) for name in condition.geometries]
         for geometry in geometries:
             _check_way(condition, scene.joints, geometry.body, condition.of, f"{geometry.name} does not move against {condition.of}")
+        if len(self.pairs) + len(condition.faces) * len(geometries) > MOST_PAIRS:
+            problem = (
+                f"it has {len(condition.faces)} faces and {len(geometries)} geometries: more than {MOST_PAIRS} pairs stand for conditions"
+            )
+            raise _wrong(condition, problem)
         reach = zone_reach(scene, condition)
         for i, (*normal, offset) in enumerate(condition.faces):
             if offset >= reach:
@@ -345,5 +352,8 @@ def _reach(scene: Scene, geometry: Geometry, of: str) -> float:
 
 def _wrong(condition: Condition, problem: str) -> SceneError:
     return SceneError(
-        "condition", f"{escaped(condition.name)}: {problem}", field="conditions", hint="docs/conditions.md says what conditions need"
+        "condition",
+        f"{escaped(condition.name)}: {problem}",
+        field=f"conditions.{condition.name}",
+        hint="docs/conditions.md says what conditions need",
     )

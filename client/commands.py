@@ -10,6 +10,7 @@ from typing import Any
 
 from certifier.errors import CirisError
 from certifier.outcome import Outcome
+from certifier.scene.file import read_condition_file
 from certifier.verify.decimals import at_most_mm, exactly
 from certifier.verify.uncovered import named
 from ciris.documents import Document
@@ -51,6 +52,19 @@ def scene_add(args: Namespace) -> int:
         print_json(scene)
     else:
         print(f"{scene['id']}  {scene['name']}: {scene['joints']} joints, {scene['geometries']} geometries, {scene['pairs']} pairs")
+    return OK
+
+
+def scene_constrain(args: Namespace) -> int:
+    conditions = read_condition_file(Path(args.conditions))
+    with service.connect(args.url) as client:
+        scene = client.constrain_scene(service.scene_name(client, args.scene), conditions, args.name)
+    if args.json:
+        print_json(scene)
+    else:
+        print(f"{scene['id']}  {scene['name']}")
+        for condition in scene["conditions"]:
+            print(f"condition '{condition['name']}': {condition['statement']}")
     return OK
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from threading import Lock
 from typing import Annotated, BinaryIO
 
@@ -18,6 +18,7 @@ from api.room import KeptRoom, Room
 from api.schemas.common import Cursor, Listed, SceneGiven, WithDependents
 from api.schemas.drawing import SceneModel
 from api.schemas.scenes import (
+    ConstrainRequest,
     IgnoredPair,
     LintReport,
     PairForecast,
@@ -34,6 +35,7 @@ from certifier.model import Scene
 from certifier.names import MAX_NAME
 from certifier.pair.forecast import forecast
 from certifier.scene.bundle import load_bundle
+from certifier.scene.conditions import constrained, read_conditions, swept_in
 from certifier.verify import uncovered
 from db import audit, retention, scenes, staging
 from db.audit import Action
@@ -162,6 +164,32 @@ def get_scene_dependents(scene_id: SceneGiven, db: Db) -> Dependents:
     """Returns what is deleted with a scene: its jobs, and their regions and proofs."""
     with db.read() as session:
         return Dependents(**asdict(retention.of_scene(session, scene_id)))
+
+
+@router.post("/{scene_id}/constrain", status_code=status.HTTP_201_CREATED)
+async def constrain_scene(
+    scene_id: SceneGiven, body: ConstrainRequest, db: Db, children: Children, room: KeptRoom, caller: Submitter, response: Response
+) -> SceneDetail:
+    """Makes another scene out of one: the same, with more conditions.
+
+    Everything that is asked of the new scene keeps its conditions. The scene that it comes from stays as it is. From now on the name means
+    the new scene, also where it meant another one.
+    """
+    scene = await children.run(_constrain, db, room, caller.project, scene_id, body)
+    response.headers["Location"] = f"/v1/scenes/{scene.id}"
+    return scene
+
+
+def _constrain(db: Database, room: Room, project: str, scene_id: str, body: ConstrainRequest) -> SceneDetail:
+    room.check(db, project)
+    with db.read() as session:
+        scene_id = scenes.find(session, scene_id)
+    base = scenes.load(db, scene_id)
+    scene = replace(constrained(base, read_conditions(body.conditions), swept_in(base)), name=body.name)
+    besides = uncovered.document(scene)
+    with db.write() as session:
+        row = scenes.add(session, scene)
+        return SceneDetail.whole(row, scenes.names(session, [row.id])[row.id], scene, besides)
 
 
 @router.post("/{scene_name}/promote")

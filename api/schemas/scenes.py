@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from api.schemas.common import Document, Page
 from certifier.conditions import of_condition
 from certifier.model import JointKind, Scene
+from certifier.names import MAX_NAME
 from certifier.verify.uncovered import LISTED
 from db.models import SceneRow
+from jobs.fields import Request
 
 
 class SceneSummary(BaseModel):
@@ -85,6 +87,7 @@ class NotCovered(BaseModel):
     summary: str = Field(description="A sentence for people.", examples=["6 pairs of neighbouring links are not covered"])
 
 
+_UPRIGHT = {"name": "upright", "cone": {"body": "arm/hand", "axis": [0, 0, 1], "along": [0, 0, 1], "degrees": 15}}
 _STATEMENT = "the direction (0, 0, 1) of 'cup/cup' stays within 15 degrees of (0, 0, 1) of 'world'"
 
 
@@ -98,6 +101,21 @@ class ConditionInfo(BaseModel):
     statement: str = Field(
         description="What holds, in words.",
         examples=[_STATEMENT],
+    )
+
+
+class ConstrainRequest(Request):
+    """Asks for a scene like another one, with more conditions."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"name": "upright-cell", "conditions": [_UPRIGHT]}]})
+
+    name: str = Field(min_length=1, max_length=MAX_NAME, description="Name of the new scene.", examples=["upright-cell"])
+    conditions: list[dict[str, Any]] = Field(
+        min_length=1,
+        max_length=100,
+        description="The conditions, each as in a scene file: a `name`, and one of `cone`, `inside`, `distance` and `range` "
+        "(docs/conditions.md).",
+        examples=[[_UPRIGHT]],
     )
 
 

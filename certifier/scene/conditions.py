@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -60,11 +60,40 @@ def read_conditions(value: Any) -> tuple[ConditionEntry, ...]:
     return tuple(found)
 
 
-def condition(entry: ConditionEntry, scene: Scene, swept: Collection[str] = ()) -> Condition:
-    """Returns the condition that an entry describes.
+def constrained(scene: Scene, entries: Sequence[ConditionEntry], swept: Collection[str] = ()) -> Scene:
+    """Returns a scene with the conditions that it has, and with these.
 
     Args:
         swept: joints that are swept. Geometries behind them stand for all of their places, but frames are in the middle.
+
+    Raises:
+        SceneError: ``scene_field``; ``unknown_name``, for a body, a geometry or a joint that the scene does not have; ``condition``.
+    """
+    from certifier.conditioned import with_conditions, without_conditions
+
+    base = without_conditions(scene)
+    try:
+        return with_conditions(base, [*scene.conditions, *(condition(entry, base, swept) for entry in entries)])
+    except SceneError as error:
+        error.field = {f"conditions.{entry.name}": entry.field for entry in entries}.get(error.field or "", error.field)
+        raise
+
+
+def swept_in(scene: Scene) -> Collection[str]:
+    """Returns the joints of a scene that are swept.
+
+    Raises:
+        SceneError: ``condition``, for a scene that was read before ciris kept their names, where some are.
+    """
+    known: list[str] | None = scene.provenance.get("swept")
+    if known is None and any(" is swept from " in warning for warning in scene.warnings):
+        hint = "write the conditions into the scene file, and add it"
+        raise SceneError("condition", "the scene has a joint that is swept, and its name was not kept", field="conditions", hint=hint)
+    return known or ()
+
+
+def condition(entry: ConditionEntry, scene: Scene, swept: Collection[str]) -> Condition:
+    """Returns the condition that an entry describes.
 
     Raises:
         SceneError: ``scene_field``; ``unknown_name``, for a body, a geometry or a joint that the scene does not have.

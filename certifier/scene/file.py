@@ -153,6 +153,20 @@ def read_scene_file(path: Path) -> SceneFile:
     )
 
 
+def read_condition_file(path: Path) -> list[dict[str, Any]]:
+    """Returns the ``conditions`` of a file that has them as a scene file has them. Other keys of scene files do not count.
+
+    Raises:
+        SceneError: as :func:`read_scene_file`.
+    """
+    nodes = _mapping(compose(_text(path), path.name), path.name)
+    if "conditions" not in nodes:
+        raise fields.wrong("conditions", f"is missing in {path.name}", hint="write conditions, as docs/conditions.md shows them")
+    found: list[dict[str, Any]] = fields.construct(nodes["conditions"], "conditions")
+    read_conditions(found)
+    return found
+
+
 def existing(path: str | Path) -> Path:
     """Returns the absolute path of a scene file that is there. No directory in it is a symbolic link, and the file itself may be one.
 
@@ -171,7 +185,7 @@ def _text(path: Path) -> str:
     try:
         data = path.read_bytes()
     except OSError:
-        raise SceneError("scene_not_found", f"the scene file {path} cannot be read", hint="is it there, and may you read it?") from None
+        raise SceneError("scene_not_found", f"the file {path} cannot be read", hint="is it there, and may you read it?") from None
     if len(data) > MAX_BYTES:
         raise SceneError("scene_yaml", f"{path.name} has {len(data)} bytes; a scene file may have at most {MAX_BYTES}")
     return decoded(data, path.name)

@@ -42,14 +42,13 @@ from pydrake.multibody.tree import PrismaticJoint, QuaternionFloatingJoint, Revo
 from pydrake.solvers import MathematicalProgram
 from pydrake.systems.framework import DiagramBuilder
 
-from certifier.conditioned import with_conditions
 from certifier.errors import SceneError
 from certifier.model import Array, Geometry, Joint, JointKind, Scene
 from certifier.names import MAX_SENTENCE, escaped
 from certifier.positions import MAGNITUDE
 from certifier.scene import following, shapes
 from certifier.scene.census import check_counts
-from certifier.scene.conditions import condition
+from certifier.scene.conditions import constrained
 from certifier.scene.configurations import own_configurations, srdf_configurations
 from certifier.scene.copies import Copies
 from certifier.scene.decomposition.parts import Decomposition
@@ -139,6 +138,7 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
             "directives": scene_file.directives,
             "packages": {name: escaped(root.name) for name, root in scene_file.packages.items()},
             "drake": importlib.metadata.version("drake"),
+            **({"swept": list(sweeps)} if sweeps else {}),
             **({"coacd": importlib.metadata.version("coacd")} if scene_file.decompose else {}),
             **recorded(
                 {geometry.name: reached[geometry.name] for geometry in geometries if geometry.name in reached},
@@ -152,7 +152,7 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     states, left_out = srdf_configurations(scene, semantics, at, followers)
     files = {entry.reason: one.file for one in semantics for entry in one.ignore}
     named = replace(scene, configurations=states | own_configurations(scene, scene_file.configurations))
-    document = with_conditions(named, [condition(entry, scene, sweeps) for entry in scene_file.conditions]).to_document()
+    document = constrained(named, scene_file.conditions, sweeps).to_document()
     document["warnings"] = (
         warnings
         + said_of(sweeps)

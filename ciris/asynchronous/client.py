@@ -113,6 +113,10 @@ class AsyncClient:
         files = {"bundle": ("scene.zip", bundle(path), "application/zip")}
         return await self._json("POST", "/v1/scenes", params={"stage": name}, files=files)
 
+    async def constrain_scene(self, scene: str, conditions: Sequence[Document], name: str) -> Document:
+        """Makes another scene out of one, with more conditions, and returns it."""
+        return await self._json("POST", f"/v1/scenes/{segment(scene)}/constrain", json={"name": name, "conditions": list(conditions)})
+
     async def promote_scene(self, name: str, without_regions: bool = False) -> Document:
         """Makes a name mean its staged scene, and returns what it means and what it meant."""
         return await self._json("POST", f"/v1/scenes/{segment(name)}/promote", params={"without_regions": without_regions})

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Literal, Self, Unpack
+from typing import Any, Literal, Self, Unpack
 from weakref import WeakValueDictionary
 
 from numpy.typing import ArrayLike
@@ -176,6 +176,15 @@ class Service:
     def stage_scene(self, name: str, path: str | Path) -> Scene:
         """Uploads a scene file as the next version of a name. ``NAME@staged`` means it, and the name means what it did."""
         return self.scene((self.client.stage_scene(name, path))["id"])
+
+    def constrain_scene(self, scene: str | Scene, conditions: Sequence[Mapping[str, Any]], *, name: str) -> Scene:
+        """Makes another scene out of one: the same, with more conditions. Everything that is asked of it keeps them.
+
+        Args:
+            conditions: each as in a scene file, such as ``{"name": "upright", "cone": {"body": "arm/hand", ...}}``.
+            name: of the new scene. From now on it means this scene, also where it meant another one.
+        """
+        return Scene.of(self.client.constrain_scene(scene_name(scene), document(list(conditions)), name))
 
     def promote_scene(self, name: str, *, without_regions: bool = False) -> Scene:
         """Makes a name mean its staged scene, once the service has compared all of that scene's regions, and returns the scene.

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from client.arguments.common import as_json, dependents, group, remote
+from client.arguments.common import SCENE, as_json, dependents, group, remote
 
 
 def add(verbs: Any) -> None:
     """Adds the commands."""
-    scene = group(verbs.add_parser("scene", help="draft, check, add, stage, promote, list, show and delete scenes"))
+    scene = group(verbs.add_parser("scene", help="draft, check, add, constrain, stage, promote, list, show and delete scenes"))
     init = scene.add_parser(
         "init",
         help="write a scene file and a seed for a robot's model",
@@ -64,6 +64,16 @@ def add(verbs: Any) -> None:
     stage.add_argument("name", metavar="NAME", help="the name of a scene that the service knows")
     stage.add_argument("path", metavar="PATH.yaml", help="the scene file of the next version; its own name does not count")
     stage.set_defaults(run="client.staging:scene_stage")
+    constrain = scene.add_parser(
+        "constrain",
+        parents=[remote(), as_json()],
+        help="make another scene out of one: the same, with more conditions",
+        epilog="FILE has `conditions:` as a scene file has them. The scene that the new one comes from stays as it is.",
+    )
+    constrain.add_argument("scene", metavar="SCENE", help=SCENE)
+    constrain.add_argument("conditions", metavar="FILE", help="YAML file with the conditions")
+    constrain.add_argument("--name", metavar="NAME", required=True, help="name of the new scene")
+    constrain.set_defaults(run="client.commands:scene_constrain")
     promote = scene.add_parser("promote", parents=[remote(), as_json()], help="make a name mean its staged scene from now on")
     promote.add_argument("name", metavar="NAME", help="the name that the scene was staged under")
     promote.add_argument("--without-regions", action="store_true", help="promote a scene without regions where the present scene has some")

@@ -29,6 +29,8 @@ from tests.workers.service import environment
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FILE = Path(__file__).parents[2] / "api" / "examples.json"
 PAIR = {"a": "arm/upper/bar", "b": "arm/lower/bar"}
+LOW = {"name": "low", "inside": {"what": ["arm/lower"], "half_spaces": [[0, 0, 1, 0.9]]}}
+AHEAD = {"name": "ahead", "cone": {"body": "arm/lower", "axis": [1, 0, 0], "along": [1, 0, 0], "degrees": 60}}
 CERTAIN = {
     "tube": 0.012,
     "clearance": 0.0141,
@@ -227,6 +229,8 @@ def record(client: TestClient, database: Database) -> dict[str, Any]:
     for part in ("", "/webhook", "/pairs", "/pairs/states", "/events", "/growth", "/obstacles", "/workers", "/dependents"):
         for job in (grown, other):
             ask("GET", f"/v1/jobs/{{job_id}}{part}", job_id=job["id"])
+    ask("POST", "/v1/scenes/{scene_id}/constrain", {"name": "low-arm", "conditions": [LOW, AHEAD]}, scene_id=name)
+    ask("GET", "/v1/scenes/{scene_id}/model", scene_id="low-arm")
     for part in ("", "/configurations", "/pairs", "/pairs/0/cells"):
         ask("GET", f"/v1/regions/{{region_id}}{part.replace('/0/', '/{pair}/')}", region_id=grown["region"], pair=0)
     ask("POST", "/v1/regions/{region_id}/verify", region_id=grown["region"])

@@ -65,6 +65,33 @@ def test_a_zone_with_nothing_in_it_is_drawn_as_nothing(upright: Scene) -> None:
     assert (zone.vertices, zone.triangles) == ([], [])
 
 
+def test_a_scene_becomes_another_one_with_more_conditions(client: TestClient, upright: Scene) -> None:
+    below = {"name": "low", "inside": {"what": ["arm/link2/bar"], "half_spaces": [[0, 1, 0, 1.5]]}}
+    made = client.post("/v1/scenes/planar/constrain", json={"name": "lower", "conditions": [below]})
+    assert made.status_code == 201, made.text
+    told = made.json()
+    assert made.headers["Location"] == f"/v1/scenes/{told['id']}"
+    assert (told["name"], told["names"]) == ("lower", ["lower"])
+    assert [one["name"] for one in told["conditions"]] == ["along-x", "below", "low"]
+    expected = with_conditions(
+        without_conditions(upright), [*upright.conditions, Inside("low", ("arm/link2/bar",), WORLD, ((0.0, 1.0, 0.0, 1.5),))]
+    )
+    assert told["hash"] == expected.hash
+    assert client.get("/v1/scenes/planar").json()["hash"] == upright.hash
+    assert client.get("/v1/scenes/lower").json()["id"] == told["id"]
+    again = client.post("/v1/scenes/lower/constrain", json={"name": "lower", "conditions": [below]})
+    assert (again.status_code, again.json()["code"], again.json()["field"]) == (422, "condition", "conditions")
+    for conditions, field in (
+        ([{"name": "c", "cone": {"body": "arm/link2", "axis": [1, 0, 0], "along": [1, 0, 0], "degrees": 200}}], "conditions[0].cone"),
+        ([{"name": "c", "cone": {"body": "arm/hand", "axis": [1, 0, 0], "along": [1, 0, 0], "degrees": 20}}], "conditions[0].cone.body"),
+        ([{"name": "c"}], "conditions[0]"),
+        ([], "conditions"),
+    ):
+        refused = client.post("/v1/scenes/planar/constrain", json={"name": "never", "conditions": conditions})
+        assert (refused.status_code, refused.json()["field"]) == (422, field), refused.text
+    assert client.get("/v1/scenes/never").status_code == 404
+
+
 def test_a_motion_keeps_the_conditions_or_says_which_is_not_kept(client: TestClient, upright: Scene) -> None:
     asked = {"scene": "planar", "start": [0.0, 0.0], "seconds": 1.0}
     found = client.post("/v1/planning/plan", json={**asked, "goal": [0.5, -0.5]}).json()

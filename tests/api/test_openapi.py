@@ -78,6 +78,7 @@ OPERATIONS = {
     "find_contacts": "POST /v1/planning/contacts",
     "slice_space": "POST /v1/planning/slice",
     "get_graph": "GET /v1/planning/graph",
+    "constrain_scene": "POST /v1/scenes/{scene_id}/constrain",
     "promote_scene": "POST /v1/scenes/{scene_name}/promote",
     "get_scene_dependents": "GET /v1/scenes/{scene_id}/dependents",
     "delete_scene": "DELETE /v1/scenes/{scene_id}",

@@ -71,15 +71,15 @@ def bearer(key: str) -> dict[str, str]:
     return {"Authorization": f"Bearer {key}"}
 
 
-def naming(schema: dict[str, Any], schemas: dict[str, Any], theirs: dict[str, str]) -> list[dict[str, Any]]:
-    """Returns valid bodies for a request of this schema that name the scene, and the region, of the others."""
+def naming(schema: dict[str, Any], schemas: dict[str, Any], theirs: dict[str, str], *, any_body: bool) -> list[dict[str, Any]]:
+    """Returns valid bodies for a request of this schema that name the scene, and the region, of the others; or any, if its path does."""
     chosen = [schema, *schema.get("oneOf", []), *schema.get("anyOf", [])]
     bodies = []
     for one in chosen:
         described = schemas[one["$ref"].rpartition("/")[2]] if "$ref" in one else one
         for example in described.get("examples", []):
             bodies.append(renamed(example, theirs))
-    return [body for body in bodies if any(one in str(body) for one in theirs.values())]
+    return [body for body in bodies if any_body or any(one in str(body) for one in theirs.values())]
 
 
 def renamed(value: Any, theirs: dict[str, str], name: str = "") -> Any:
@@ -106,7 +106,7 @@ def requests(document: dict[str, Any], theirs: dict[str, str]) -> list[tuple[str
         where = path.format(**values)
         content = operation.get("requestBody", {}).get("content", {})
         if content:
-            bodies = naming(content["application/json"]["schema"], document["components"]["schemas"], theirs)
+            bodies = naming(content["application/json"]["schema"], document["components"]["schemas"], theirs, any_body="{" in path)
             assert bodies, f"{name} has no example of a body, so nobody knows whether it keeps projects apart"
             found += [(name, method, where, {"json": body, "params": asked}) for body in bodies]
         else:

@@ -51,6 +51,13 @@ def test_a_scene_file_is_uploaded_with_all_it_refers_to(service: Any) -> None:
     assert np.allclose(added.to_s([np.pi / 2, 0]), [1, 0])
 
 
+def test_a_scene_is_constrained(service: Any, scene: Scene) -> None:
+    low = {"name": "low", "inside": {"what": ["model/cart"], "half_spaces": np.array([[0.0, 0.0, 1.0, 0.5]])}}
+    found = service.constrain_scene("slider", [low], name="low-slider")
+    assert (found.name, service.scene("low-slider"), service.scene("slider").hash) == ("low-slider", found, scene.hash)
+    assert found.hash != scene.hash
+
+
 def test_a_scene_is_staged_and_promoted(service: Any, region: str) -> None:
     present = service.scene("slider")
     staged = service.stage_scene("slider", ROOT / "examples" / "planar_2dof" / "scene.yaml")

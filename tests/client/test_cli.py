@@ -379,6 +379,21 @@ def test_contains_answers_by_its_exit_status(ciris: Ciris, url: str, region: str
     assert (wrong.status, wrong.error.startswith("--q[0]: 2 numbers were given")) == (2, True)
 
 
+def test_a_scene_of_the_service_gets_conditions(ciris: Ciris, url: str, scene: Scene, tmp_path: Path) -> None:
+    (tmp_path / "low.yaml").write_text("conditions:\n  - name: low\n    inside: {what: [model/cart], half_spaces: [[0, 0, 1, 0.5]]}\n")
+    made = ciris("scene", "constrain", "slider", "low.yaml", "--name", "low-slider", CIRIS_URL=url)
+    assert made.status == 0, made.error
+    first, statement = made.stdout.splitlines()
+    assert first.endswith("  low-slider")
+    assert statement.startswith("condition 'low': 'model/")
+    assert ciris("scene", "show", "low-slider", "--json", CIRIS_URL=url).json["conditions"][0]["name"] == "low"
+    (tmp_path / "none.yaml").write_text("name: low\n")
+    wrong = ciris("scene", "constrain", "slider", "none.yaml", "--name", "x", CIRIS_URL=url)
+    assert (wrong.status, wrong.error.startswith("conditions: is missing in none.yaml")) == (2, True)
+    gone = ciris("scene", "constrain", "slider", "gone.yaml", "--name", "x", CIRIS_URL=url)
+    assert (gone.status, "the file gone.yaml cannot be read" in gone.error) == (2, True)
+
+
 def test_who_loses_the_service_is_told_how_to_come_back(ciris: Ciris, url: str, scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     def lost(*_: object) -> None:
         raise CirisError("unreachable", f"the service at {url} does not answer")

@@ -22,6 +22,7 @@ TESTED = {
     "certifier/map/free_set.py:free_set": "tests/certifier/map/test_free_set.py",
     "certifier/scene/census.py:check_counts": "tests/certifier/scene/test_names.py",
     "certifier/scene/conditions.py:_joint": "tests/certifier/scene/test_conditions.py",
+    "certifier/scene/conditions.py:swept_in": "tests/certifier/scene/test_conditions.py",
     "certifier/scene/decomposition/child.py:_too_thin": "tests/certifier/scene/decomposition/test_parts.py",
     "certifier/scene/decomposition/child.py:decompose": "tests/certifier/scene/decomposition/test_parts.py",
     "certifier/scene/decomposition/child.py:enlarged": "tests/certifier/scene/decomposition/test_parts.py",

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from certifier.conditioned import without_conditions
 from certifier.conditions import Cone, Distance, Inside, Range
 from certifier.errors import SceneError
 from certifier.model import Scene
-from certifier.scene.conditions import condition
+from certifier.scene.conditions import condition, constrained, read_conditions, swept_in
 from certifier.scene.file import read_scene_file
 from certifier.scene.load import load_scene
 
@@ -94,15 +96,41 @@ def test_all_kinds_are_read(tmp_path: Path) -> None:
 def test_errors_name_the_field(tmp_path: Path, scene: Scene, said: str, code: str, field: str, words: str) -> None:
     (entry,) = read_scene_file(file(tmp_path, f"  - name: c\n    {said}")).conditions
     with pytest.raises(SceneError, match=words) as error:
-        condition(entry, scene)
+        condition(entry, scene, ())
     assert (error.value.code, error.value.field) == (code, f"conditions[0].{field}")
 
 
-def test_a_condition_that_nothing_can_break_or_keep_is_refused(tmp_path: Path) -> None:
-    path = file(tmp_path, "  - name: c\n    cone: {body: arm/base, axis: [0, 0, 1], along: [0, 0, 1], degrees: 5}")
-    with pytest.raises(SceneError, match="no joint turns the one direction against the other") as error:
+@pytest.mark.parametrize(
+    ("said", "field", "words"),
+    [
+        ("cone: {body: arm/base, axis: [0, 0, 1], along: [0, 0, 1], degrees: 5}", "cone", "no joint turns the one direction"),
+        ("cone: {body: cup/cup, axis: [0, 0, 1], along: [0, 0, 1], degrees: 200}", "cone", "between 0.1 and 179.9 degrees"),
+        ("range: {joints: {arm/elbow_joint: 1}, degrees: [90, 0]}", "range", "0.2 to 359.8 degrees apart"),
+    ],
+)
+def test_a_condition_that_makes_no_sense_is_refused(tmp_path: Path, said: str, field: str, words: str) -> None:
+    path = file(tmp_path, f"  - name: fine\n    range: {{joints: {{arm/elbow_joint: 1}}, degrees: [0, 90]}}\n  - name: c\n    {said}")
+    with pytest.raises(SceneError, match=words) as error:
         load_scene(path)
-    assert (error.value.code, error.value.field) == ("condition", "conditions")
+    assert (error.value.code, error.value.field) == ("condition", f"conditions[1].{field}")
+
+
+def test_a_scene_is_constrained_as_if_its_file_had_the_conditions(tmp_path: Path, scene: Scene) -> None:
+    bare = load_scene(file(tmp_path, "  []"))
+    entries = read_scene_file(EXAMPLES / "ur3e_cup/scene.yaml").conditions
+    one = constrained(bare, entries[:1])
+    assert constrained(one, entries[1:]).hash == constrained(bare, entries).hash == scene.hash
+    with pytest.raises(SceneError, match="two conditions have one name"):
+        constrained(one, entries)
+    assert constrained(scene, ()).hash == scene.hash
+
+
+def test_conditions_have_a_bounded_number_of_pairs(scene: Scene) -> None:
+    faces = [[math.cos(0.1 * i), math.sin(0.1 * i), 0.0, 0.3] for i in range(60)]
+    zones = [{"name": f"zone{i}", "inside": {"what": ["cup/cup"], "half_spaces": faces}} for i in range(200)]
+    with pytest.raises(SceneError, match="more than 10000 pairs") as error:
+        constrained(without_conditions(scene), read_conditions(zones))
+    assert (error.value.code, error.value.field) == ("condition", "conditions[166].inside")
 
 
 def test_a_frame_behind_a_swept_joint_is_refused(tmp_path: Path) -> None:
@@ -116,3 +144,16 @@ def test_a_frame_behind_a_swept_joint_is_refused(tmp_path: Path) -> None:
         with pytest.raises(SceneError, match="is behind the joint arm/wrist_3_joint, which is swept") as error:
             load_scene(path)
         assert error.value.code == "scene_field"
+        (entry,), swept = read_scene_file(path).conditions, load_scene(bare(path))
+        with pytest.raises(SceneError, match="is behind the joint arm/wrist_3_joint, which is swept"):
+            constrained(swept, [entry], swept_in(swept))
+        older = replace(swept, provenance={"directives": ""})
+        with pytest.raises(SceneError, match="its name was not kept"):
+            swept_in(older)
+
+
+def bare(path: Path) -> Path:
+    """The same scene file without conditions."""
+    found = path.with_name("bare.yaml")
+    found.write_text(path.read_text().partition("conditions:")[0] + "fix: {arm/wrist_3_joint: swept}")
+    return found
