@@ -10,8 +10,9 @@ All numbers are rounded to the safe side by ROOM: two geometries are apart only 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 
@@ -32,13 +33,13 @@ LONG = 2.0
 TIGHT = 14 / 15
 """Proposals are made for cones and ranges that are narrower by this factor (docs/trials.md)."""
 FAR = 2.0
-"""The box beyond a face extends to this many times what the geometries reach. The tube of a motion may go beyond the limits of slides."""
+"""The box beyond a face extends to this many times what the geometries reach within the joint limits."""
 LEAST_ANGLE = math.radians(0.1)
 """A cone is no narrower than this, so that ROOM does not matter."""
-MOST_FACES = 100
-"""A zone has at most this many faces."""
-MOST_PAIRS = 10_000
-"""At most this many pairs stand for the conditions of a scene."""
+MOST_CONDITIONS, MOST_FACES, MOST_IN_ZONES = 100, 100, 20_000
+"""A scene has at most this many conditions, a zone this many faces, and all zones together this many pairs of a geometry and a face."""
+MOST_TURNS = 10
+"""The lower angle of a range is at most this many turns, so that ROOM is far above what doubles round in it."""
 UNIT = 1e-12
 """The length of a direction differs from 1 by less than this."""
 TURNING = "turning"
@@ -60,22 +61,38 @@ def with_conditions(scene: Scene, conditions: Sequence[Condition]) -> Scene:
     if own := next(filter(of_condition, names), None):
         hint = "rename the model"
         raise SceneError("condition", f"{own} would stand for a condition: no model may be called {MODEL}", field="directives", hint=hint)
+    _check_size(conditions)
     parts = _Parts(scene)
     for condition in conditions:
         _check(scene, condition)
         parts.add(condition)
     if len({condition.name for condition in conditions}) < len(conditions):
         raise SceneError("condition", "two conditions have one name", field="conditions", hint="give each its own name")
-    if too_long := next((name for name in (*parts.names, *(g.name for g in parts.geometries)) if not is_name(name)), None):
+    if too_long := next((name for name in (*parts.above, *(g.name for g in parts.geometries)) if not is_name(name)), None):
         raise SceneError("condition", f"the name {escaped(too_long)[:60]}... is too long", field="conditions", hint="give shorter names")
     return replace(
         scene,
-        joints=(*scene.joints, *parts.joints),
-        bodies=(*scene.bodies, *parts.names),
+        joints=(*scene.joints, *parts.above.values()),
+        bodies=(*scene.bodies, *parts.above),
         geometries=(*scene.geometries, *parts.geometries),
         pairs=(*parts.padded, *parts.pairs),
         conditions=tuple(conditions),
     )
+
+
+def _check_size(conditions: Sequence[Condition]) -> None:
+    """Checks that there are not too many conditions, before anything is made of them.
+
+    Raises:
+        SceneError: ``condition``.
+    """
+    pairs = sum(len(one.geometries) * len(one.faces) for one in conditions if isinstance(one, Inside))
+    for number, most, what, hint in (
+        (len(conditions), MOST_CONDITIONS, "conditions", "leave some out"),
+        (pairs, MOST_IN_ZONES, "pairs of a geometry and a face of a zone", "name fewer geometries, or give zones fewer faces"),
+    ):
+        if number > most:
+            raise SceneError("condition", f"there are {number} {what}, and {most} at most", field="conditions", hint=hint)
 
 
 def all_names(scene: Scene) -> list[str]:
@@ -108,6 +125,8 @@ def _check(scene: Scene, condition: Condition) -> None:
                 raise _wrong(condition, f"its zone needs 1 to {MOST_FACES} faces")
             _check_vectors(condition, *(face[:3] for face in condition.faces))
         case Distance():
+            if not (is_name(condition.a) and is_name(condition.b)):
+                raise _wrong(condition, "it has to name two bodies or geometries")
             if not 0 < condition.metres <= MAGNITUDE:
                 raise _wrong(condition, "its distance has to be positive")
         case Range():
@@ -115,8 +134,10 @@ def _check(scene: Scene, condition: Condition) -> None:
             if not names or len(set(names)) < len(names) or not {*names} <= known:
                 raise _wrong(condition, "it has to name joints that turn and have positions of their own, each once")
             apart = condition.upper - condition.lower
-            if not (2 * LEAST_ANGLE <= apart <= 2 * (math.pi - LEAST_ANGLE) and abs(condition.lower) <= MAGNITUDE):
+            if not 2 * LEAST_ANGLE <= apart <= 2 * (math.pi - LEAST_ANGLE):
                 raise _wrong(condition, "its angles have to be 0.2 to 359.8 degrees apart")
+            if not abs(condition.lower) <= 2 * math.pi * MOST_TURNS:
+                raise _wrong(condition, f"its lower angle has to be within {360 * MOST_TURNS} degrees of 0")
 
 
 def _check_bodies(scene: Scene, condition: Condition, *bodies: str) -> None:
@@ -170,7 +191,7 @@ def condition_of(scene: Scene, pair: Pair) -> Condition | None:
 
 def distance_of(scene: Scene, pair: Pair) -> Distance | None:
     """Returns the condition with the largest distance that the two bodies of a pair have to keep; None where there is none."""
-    kept = [one for one in scene.conditions if isinstance(one, Distance) and frozenset((pair.a, pair.b)) in _between(scene, one)]
+    kept = [one for one in scene.conditions if isinstance(one, Distance) and _between(_sides(scene, one), pair)]
     return max(kept, key=lambda one: one.metres, default=None)
 
 
@@ -182,18 +203,18 @@ def called(scene: Scene, pair: Pair) -> str:
 
 @dataclass
 class _Parts:
-    """Gathers what stands for the conditions of a scene."""
+    """Gathers what stands for the conditions of a scene.
+
+    Attributes:
+        above: maps each body to the joint whose child it is.
+        padded: the pairs of the scene itself.
+    """
 
     scene: Scene
-    joints: list[Joint] = field(default_factory=list)
+    above: dict[str, Joint] = field(default_factory=dict)
     geometries: list[Geometry] = field(default_factory=list)
     pairs: list[Pair] = field(default_factory=list)
     padded: list[Pair] = field(init=False)
-
-    @property
-    def names(self) -> list[str]:
-        """The bodies."""
-        return [joint.child for joint in self.joints]
 
     def __post_init__(self) -> None:
         self.padded = list(self.scene.pairs)
@@ -212,7 +233,7 @@ class _Parts:
 
     def _cone(self, condition: Cone | Range, body: str, axis: Sequence[float], of: str, along: Sequence[float]) -> None:
         angle = condition.angle if isinstance(condition, Cone) else (condition.upper - condition.lower) / 2
-        _check_way(condition, self.joints, body, of, "no joint turns the one direction against the other")
+        _check_way(condition, self.above, body, of, "no joint turns the one direction against the other")
         top = math.cos(angle) + ROOM - BALL
         beyond = _slab(np.array(along), top, -LONG - top, LONG)
         names, shape = [f"{MODEL}/{condition.name}/{one}" for one in ("beyond", "direction")], {"kind": "condition"}
@@ -230,7 +251,7 @@ class _Parts:
                 copied = replace(joint, name=copy, parent=parent, child=copy, X_PF=X_PF, X_BM=X_BM, follows=True)
             else:
                 copied = Joint(copy, JointKind.WELD, parent, copy, np.zeros(3), X_PF, X_BM)
-            self.joints.append(copied)
+            self.above[copy] = copied
             self._copies[body] = copy
         return self._copies[body]
 
@@ -241,22 +262,17 @@ class _Parts:
             leader, child = moving[name], f"{MODEL}/{condition.name}/turn{i}"
             axis = np.array([0.0, 0.0, float(sign)])
             turn = replace(leader, name=child, parent=parent, child=child, axis=axis, X_PF=np.eye(4), X_BM=np.eye(4), follows=True)
-            self.joints.append(turn)
+            self.above[child] = turn
             parent = child
         middle = (condition.lower + condition.upper) / 2
         self._cone(condition, parent, (1.0, 0.0, 0.0), WORLD, (math.cos(middle), math.sin(middle), 0.0))
 
     def _inside(self, condition: Inside) -> None:
         scene, frame = self.scene, f"{MODEL}/{condition.name}/zone"
-        self.joints.append(Joint(frame, JointKind.WELD, condition.of, frame, np.zeros(3), np.eye(4), np.eye(4)))
+        self.above[frame] = Joint(frame, JointKind.WELD, condition.of, frame, np.zeros(3), np.eye(4), np.eye(4))
         geometries = [scene.geometry(name) for name in condition.geometries]
         for geometry in geometries:
-            _check_way(condition, scene.joints, geometry.body, condition.of, f"{geometry.name} does not move against {condition.of}")
-        if len(self.pairs) + len(condition.faces) * len(geometries) > MOST_PAIRS:
-            problem = (
-                f"it has {len(condition.faces)} faces and {len(geometries)} geometries: more than {MOST_PAIRS} pairs stand for conditions"
-            )
-            raise _wrong(condition, problem)
+            _check_way(condition, scene.joint_above, geometry.body, condition.of, f"{geometry.name} does not move against {condition.of}")
         reach = zone_reach(scene, condition)
         for i, (*normal, offset) in enumerate(condition.faces):
             if offset >= reach:
@@ -267,25 +283,29 @@ class _Parts:
             self.pairs += [Pair(*sorted((name, geometry.name)), padding=0.0) for geometry in geometries]
 
     def _distance(self, condition: Distance) -> None:
-        scene, between = self.scene, _between(self.scene, condition)
-        kept = {frozenset((pair.a, pair.b)) for pair in scene.pairs}
-        missing = next(iter(sorted(tuple(sorted(names)) for names in between - kept)), None)
-        if missing is not None or not between:
-            what = " and ".join(missing) if missing else f"{condition.a} and {condition.b}"
+        scene, sides = self.scene, _sides(self.scene, condition)
+        kept = {(pair.a, pair.b) for pair in scene.pairs}
+        missing = next((pair for pair in product(*map(sorted, sides)) if tuple(sorted(pair)) not in kept), None)
+        if missing or not all(sides):
+            what = " and ".join(missing or (condition.a, condition.b))
             raise _wrong(condition, f"the scene does not certify {what} against each other")
         each = condition.metres / 2 * (1 + ROOM)
         self.padded = [
-            replace(pair, padding=max(each, pair.padding if pair.padding is not None else scene.padding))
-            if frozenset((pair.a, pair.b)) in between
-            else pair
+            replace(pair, padding=max(each, pair.padding if pair.padding is not None else scene.padding)) if _between(sides, pair) else pair
             for pair in self.padded
         ]
 
 
-def _between(scene: Scene, condition: Distance) -> set[frozenset[str]]:
-    """Returns the names of the two geometries of each pair that has to keep a distance."""
-    sides = [{g.name for g in scene.geometries if name in (g.name, g.body, g.shape.get("of"))} for name in (condition.a, condition.b)]
-    return {frozenset((a, b)) for a in sides[0] for b in sides[1]}
+def _sides(scene: Scene, condition: Distance) -> tuple[set[str], set[str]]:
+    """Returns the geometries of the one side, and those of the other, that have to keep a distance."""
+    names = {one: {g.name for g in scene.geometries if one in (g.name, g.body, g.shape.get("of"))} for one in (condition.a, condition.b)}
+    return names[condition.a], names[condition.b]
+
+
+def _between(sides: tuple[set[str], set[str]], pair: Pair) -> bool:
+    """Returns whether one geometry of a pair is on the one side, and the other on the other."""
+    a, b = sides
+    return (pair.a in a and pair.b in b) or (pair.a in b and pair.b in a)
 
 
 def _slab(normal: Array, begin: float, depth: float, lateral: float) -> Array:
@@ -308,9 +328,8 @@ def _turned(X: Array) -> Array:
     return found
 
 
-def _path(joints: Iterable[Joint], body: str, of: str) -> list[Joint]:
-    """Returns the joints between two bodies."""
-    above = {joint.child: joint for joint in joints}
+def _path(above: Mapping[str, Joint], body: str, of: str) -> list[Joint]:
+    """Returns the joints between two bodies, each of which ``above`` maps to the joint whose child it is."""
 
     def ways(start: str) -> list[Joint]:
         found = []
@@ -326,9 +345,9 @@ def _path(joints: Iterable[Joint], body: str, of: str) -> list[Joint]:
     return one + other
 
 
-def _check_way(condition: Condition, joints: Iterable[Joint], body: str, of: str, still: str) -> None:
+def _check_way(condition: Condition, above: Mapping[str, Joint], body: str, of: str, still: str) -> None:
     """Checks that a joint moves two bodies against each other, and that no two of one position do, which the verifier does not take."""
-    moving = [joint for joint in _path(joints, body, of) if joint.index is not None]
+    moving = [joint for joint in _path(above, body, of) if joint.index is not None]
     if not moving:
         raise _wrong(condition, still)
     slides = len(moving) == 2 and all(joint.kind is JointKind.PRISMATIC for joint in moving)
@@ -344,7 +363,7 @@ def zone_reach(scene: Scene, condition: Inside) -> float:
 def _reach(scene: Scene, geometry: Geometry, of: str) -> float:
     """Returns a distance in metres from a body's origin that no point of a geometry exceeds, as certifier.scene.tree.Tree.reach."""
     total = float(np.linalg.norm(geometry.vertices, axis=1).max()) + geometry.radius
-    for joint in _path(scene.joints, geometry.body, of):
+    for joint in _path(scene.joint_above, geometry.body, of):
         slide = max(abs(joint.lower or 0.0), abs(joint.upper or 0.0)) * joint.speed
         total += float(np.linalg.norm(joint.X_PF[:3, 3])) + slide + float(np.linalg.norm(joint.X_BM[:3, 3]))
     return total * (1 + ROOM) + ROOM

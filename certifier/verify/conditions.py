@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from certifier.conditioned import all_names, with_conditions, without_conditions
-from certifier.conditions import of_condition
+from certifier.conditions import Inside, of_condition
 from certifier.errors import ProofError, SceneError
-from certifier.model import Scene
+from certifier.model import JointKind, Scene
 
 ROUNDED = 1e-10
 """Vertices of what stands for conditions may differ by this from those that are computed here, in metres: other machines round cosines and
@@ -25,8 +25,11 @@ def check_conditions(scene: Scene) -> None:
     """
     if not scene.conditions and not any(map(of_condition, all_names(scene))):
         return
+    own = without_conditions(scene)
+    if not {*(joint.parent for joint in own.joints), *(geometry.body for geometry in own.geometries)} <= {*own.bodies}:
+        raise ProofError("proof_model", "the model of the proof makes no sense: a body of it hangs on what stands for a condition")
     try:
-        expected = with_conditions(without_conditions(scene), scene.conditions)
+        expected = with_conditions(own, scene.conditions)
     except SceneError as error:
         raise ProofError("proof_model", f"the model of the proof makes no sense: the condition {error.message}") from None
     if not _alike(scene, expected):
@@ -35,17 +38,20 @@ def check_conditions(scene: Scene) -> None:
 
 def _alike(scene: Scene, expected: Scene) -> bool:
     """Returns whether two scenes are the same, but for what doubles round in the vertices of what stands for conditions."""
-    mine, other = (replace(one, geometries=()).hash for one in (scene, expected))
-    if mine != other or len(scene.geometries) != len(expected.geometries):
-        return False
-    for a, b in zip(scene.geometries, expected.geometries, strict=True):
-        if (a.name, a.body, a.radius, a.vertices.shape) != (b.name, b.body, b.radius, b.vertices.shape):
+    rounded = []
+    for a, b in zip(scene.geometries, expected.geometries, strict=False):
+        if a.vertices.shape != b.vertices.shape or not (np.abs(a.vertices - b.vertices) <= ROUNDED).all():
             return False
-        if np.abs(a.vertices - b.vertices).max(initial=0.0) > ROUNDED:
-            return False
-    return True
+        rounded.append(replace(a, vertices=b.vertices))
+    return len(rounded) == len(scene.geometries) and replace(scene, geometries=tuple(rounded)).hash == expected.hash
 
 
-def conditions(scene: Scene) -> list[str]:
-    """Returns a line for each condition of a scene, all of whose pairs are proved apart."""
-    return [f"condition '{condition.name}': {condition}" for condition in scene.conditions]
+def conditions(scene: Scene, beyond_limits: bool = False) -> list[str]:
+    """Returns a line for each condition of a scene, all of whose pairs are proved apart.
+
+    Args:
+        beyond_limits: they are apart beyond the joint limits as well. What hangs on slides can be beyond all that stands for a zone there.
+    """
+    slides = beyond_limits and any(joint.kind is JointKind.PRISMATIC for joint in scene.moving)
+    where = {Inside.kind: ", at configurations within the joint limits"} if slides else {}
+    return [f"condition '{condition.name}': {condition}{where.get(condition.kind, '')}" for condition in scene.conditions]

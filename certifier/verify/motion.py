@@ -75,7 +75,7 @@ class MotionStatement:
             f"  SHA-256 of the {points} as doubles: {digest}",
             f"{part} the padded bodies of each of the scene's {len(scene.body_pairs)} pairs are at least {rounded_down(self.gap)} m apart",
             *([f"and {tube}, beyond the limits as well"] if self.rho else []),
-            *conditions(scene),
+            *conditions(scene, beyond_limits=self.rho > 0),
             *not_covered(scene),
         ]
 

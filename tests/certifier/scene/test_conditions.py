@@ -9,11 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from certifier.conditioned import without_conditions
 from certifier.conditions import Cone, Distance, Inside, Range
 from certifier.errors import SceneError
 from certifier.model import Scene
-from certifier.scene.conditions import condition, constrained, read_conditions, swept_in
+from certifier.scene.conditions import condition, constrained, swept_in
 from certifier.scene.file import read_scene_file
 from certifier.scene.load import load_scene
 
@@ -123,14 +122,6 @@ def test_a_scene_is_constrained_as_if_its_file_had_the_conditions(tmp_path: Path
     with pytest.raises(SceneError, match="two conditions have one name"):
         constrained(one, entries)
     assert constrained(scene, ()).hash == scene.hash
-
-
-def test_conditions_have_a_bounded_number_of_pairs(scene: Scene) -> None:
-    faces = [[math.cos(0.1 * i), math.sin(0.1 * i), 0.0, 0.3] for i in range(60)]
-    zones = [{"name": f"zone{i}", "inside": {"what": ["cup/cup"], "half_spaces": faces}} for i in range(200)]
-    with pytest.raises(SceneError, match="more than 10000 pairs") as error:
-        constrained(without_conditions(scene), read_conditions(zones))
-    assert (error.value.code, error.value.field) == ("condition", "conditions[166].inside")
 
 
 def test_a_frame_behind_a_swept_joint_is_refused(tmp_path: Path) -> None:
