@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from certifier.map.growing import Coverage, Growing, Task, Trees
+from certifier.map.growing import Coverage, Growing, Task, Trees, beside
 from certifier.map.pair import Found, PairTree
 from certifier.map.trees import Pairs, Plan
 from certifier.model import Array, Scene
@@ -101,9 +101,11 @@ def in_s(scene: Scene, at: Sequence[Sequence[float]]) -> Array:
 
 
 def states_of(trees: Trees, at: Array) -> list[str]:
-    """Returns ``proved``, ``open`` or ``in_collision`` for configurations, (D, n) in s."""
+    """Returns ``proved``, ``open`` or ``in_collision`` for configurations, (D, n) in s. One on a cut is proved if all sides of it are."""
     free = Plan(trees.scene).free(at)
-    return np.where(trees.contains(at), "proved", np.where(free, "open", "in_collision")).tolist()
+    sides = beside(trees.scene, at)
+    proved = trees.contains(sides.reshape(-1, trees.scene.n)).reshape(sides.shape[:2]).all(axis=1)
+    return np.where(proved, "proved", np.where(free, "open", "in_collision")).tolist()
 
 
 def grow_round(growing: Growing, work: Work, coverage: float, over: Callable[[], str | None]) -> str | None:

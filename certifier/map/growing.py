@@ -8,6 +8,7 @@ The rounds are the same whatever the machine does, so the same effort gives the 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +36,12 @@ FULL = 0.9
 """A map ends with this part of the bytes that the verifier reads."""
 DEMAND = 1000.0
 """A configuration that was asked for weighs as much as this many samples."""
+HAIR = 1e-8
+"""A configuration on a cut is proved if the cells on all sides are: these hold configurations beside it, by HAIR in each joint, radians or
+metres. Lookups need 1e-9 (ciris.free_set).
+"""
+SIDES, BESIDE = 128, 20_000
+"""At most SIDES configurations beside each one that was asked for are looked at, and about BESIDE beside all of them get cells."""
 
 
 class Task(NamedTuple):
@@ -181,6 +188,20 @@ class Trees:
         return MapProof(self.scene, tuple(worked), tuple(maps))
 
 
+def beside(scene: Scene, at: Array, most: int = SIDES) -> Array:
+    """Returns configurations a hair beside others in all joints, (D, K, n) in s: one in each direction, or in some of them.
+
+    Args:
+        at: (D, n) configurations in s.
+        most: K is at most this.
+    """
+    every = 2**scene.n <= most
+    signs = np.array(list(product((1.0, -1.0), repeat=scene.n))) if every else np.random.default_rng(0).choice((1.0, -1.0), (most, scene.n))
+    hairs = np.where(scene.revolute, HAIR * (1 + at**2) / 2, HAIR * np.maximum(1.0, np.abs(at)))
+    found: Array = np.clip(at[:, None] + signs * hairs[:, None], scene.s_lower, scene.s_upper)
+    return found
+
+
 class Growing(Trees):
     """A map that grows.
 
@@ -203,7 +224,9 @@ class Growing(Trees):
         first, held = self._free(FIRST), self._free(HELD)  # before there are trees, so that what a former map proves is among them
         self._add(first, 1.0)
         self._held = slice(len(first), len(first) + self._add(held, 0.0))
-        self._add(at[self._plan.free(at)], DEMAND)
+        wanted = beside(scene, at[self._plan.free(at)], min(SIDES, max(1, BESIDE // max(1, len(at)))))
+        sides = wanted.reshape(-1, scene.n)
+        self._add(sides[self._plan.free(sides)], DEMAND / wanted.shape[1])
         self._bytes = sum(tree.bytes for tree in self.trees.values())
 
     @property

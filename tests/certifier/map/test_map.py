@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from certifier.jobs.map import _adopted, grow_map, grow_round
+from certifier.map.free_set import as_file, free_set
 from certifier.map.growing import Growing
 from certifier.map.trees import Plan
 from certifier.model import WORLD, Joint, JointKind, Pair
@@ -18,6 +19,7 @@ from certifier.proof.map import MapProof, PairMap
 from certifier.proof.partition import OPEN, PLANE
 from certifier.proof.sub_scene import sub_scene
 from certifier.verify.map import verify_map
+from ciris.free_set import FreeSet
 from tests.certifier.scenes import ball, beads, box, hand, planar_arm, two_arms
 
 CROWDED = box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 0.9, 0.0))
@@ -199,6 +201,21 @@ def test_a_map_says_of_what_was_wanted_whether_it_is_proved():
     at = scene.to_s(np.array([[-1.0, 0.0], [0.84, 0.0]]))
     assert grow_map(scene, 0.9, at=at).wanted == ["proved", "in_collision"]
     assert grow_map(scene, 0.9, deadline_s=0.0, at=at[:1]).wanted in (["open"], ["proved"])
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_what_is_wanted_on_a_cut_is_proved_on_all_sides_as_lookups_need_it(n):
+    """Cells are halved, so the zero configuration is on a cut of every joint that is cut."""
+    scene = planar_arm(n, CROWDED)
+    q = np.zeros((1, n))
+    rows = np.random.default_rng(0).uniform(-1.0, 1.0, size=(60, n)).round(1) * np.resize([1.0, 0.0], (60, n))
+    at = scene.to_s(np.concatenate([q, rows]))
+    grown = grow_map(scene, 0.5, at=at)
+    free = FreeSet.of_bytes(as_file(free_set(grown.proof)), "here")
+    on_cuts = [(part.cuts == 0).any() for part in grown.proof.maps]
+    assert any(on_cuts)
+    assert free.contains(scene.to_q(at)).tolist() == [state == "proved" for state in grown.wanted]
+    assert grown.wanted[0] == "proved"
 
 
 def test_a_map_ends_before_the_verifier_would_not_read_it(monkeypatch):
