@@ -524,6 +524,8 @@ class StoredMap:
     uncovered_pairs: int
     """How many pairs have no cell. As long as there are some, no configuration is proved free."""
     at: tuple[Wanted, ...]
+    paths: tuple[float, ...]
+    """How much of each motion that the map was to cover first is proved: a share of its length."""
     proof: str
     """SHA-256 of the proof file."""
     free_set: bool

@@ -10,6 +10,7 @@ import json
 import zipfile
 import zlib
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Self
 
@@ -176,6 +177,19 @@ class FreeSet(InSpace):
         ordered = _joined(np.concatenate(ranges))
         proved = zip([0.0, *(until for _, until in ordered)], [*(begin for begin, _ in ordered), 1.0], strict=True)
         return np.array([part for part in proved if part[0] < part[1]]).reshape(-1, 2)
+
+    def share_of(self, path: ArrayLike) -> float:
+        """Returns how much of a motion is proved to be free, as a share of its length. It is straight between waypoints, (k, n) in q.
+
+        Raises:
+            RegionError: as :meth:`open_parts`.
+        """
+        q = np.asarray(path, dtype=float)
+        lengths = np.linalg.norm(np.diff(q, axis=0), axis=1)
+        if not lengths.sum():
+            return float(self.contains(q).all())
+        left = [1.0 - np.diff(self.proved_parts(a, b), axis=1).sum() for a, b in pairwise(q)]
+        return 1.0 - float(lengths @ left / lengths.sum())
 
     def _one(self, start: ArrayLike, end: ArrayLike) -> tuple[Array, Array]:
         """Returns the two ends of one motion, (n,) each, within the joint limits."""

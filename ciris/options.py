@@ -182,6 +182,8 @@ class MapOptions(JobOptions, total=False):
     """The map ends when it covers this share of the free configurations. Default: 0.9."""
     at: ArrayLike
     """(n,) or (k, n). Joint positions that the map is to cover first."""
+    paths: Sequence[ArrayLike]
+    """(k, n) each. Motions that the map is to cover first, straight in joint positions from waypoint to waypoint."""
     random_seed: int
     """Seed of every random choice. Default: 0."""
 
@@ -190,6 +192,7 @@ MAP: Fields = {
     **JOB,
     "coverage": ("options.coverage", "real"),
     "at": ("options.at", "points"),
+    "paths": ("options.paths", "paths"),
     "random_seed": ("options.random_seed", "whole"),
 }
 

@@ -7,7 +7,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from certifier.errors import CirisError, RegionError
+from certifier.errors import CirisError, ProofError, RegionError
 from certifier.map.options import MapOptions
 from certifier.model import Scene
 from certifier.options import read
@@ -56,7 +56,8 @@ def grow(args: Namespace) -> int:
         _print(document)
     if document["ended"] == "interrupted":
         return INTERRUPTED
-    return OK if document["outcome"] == "certified" and all(one["state"] == "proved" for one in document["at"]) else NO
+    first = [one["state"] == "proved" for one in document["at"]] + [share == 1 for share in document["paths"]]
+    return OK if document["outcome"] == "certified" and all(first) else NO
 
 
 def _here(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
@@ -65,8 +66,10 @@ def _here(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
     screen = Screen()
     scene = load(args.scene)
     wanted = [_wanted(scene, q, f"options.at[{i}]") for i, q in enumerate(asked["options"].pop("at", []))]
+    given = enumerate(asked["options"].pop("paths", []))
+    paths = [[_wanted(scene, q, f"options.paths[{i}][{j}]") for j, q in enumerate(path)] for i, path in given]
     options = read(MapOptions, asked["options"], "options")
-    from certifier.jobs.map import grow_map, in_s
+    from certifier.jobs.map import grow_map, in_s, ways_of
 
     former = None if args.former is None else _former(args.former)
 
@@ -74,7 +77,15 @@ def _here(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
         screen.status(_said(told["coverage"], told["error"], told["cells"]), told["coverage"])
 
     found = grow_map(
-        scene, options.coverage, asked.get("deadline_seconds"), cores(), tell, in_s(scene, wanted), options.random_seed, former
+        scene,
+        options.coverage,
+        asked.get("deadline_seconds"),
+        cores(),
+        tell,
+        in_s(scene, wanted),
+        options.random_seed,
+        former,
+        ways_of(scene, paths),
     )
     screen.clear()
     path = ProofFile(args.out).write(scene.name, found.proof.to_bytes())
@@ -89,6 +100,7 @@ def _here(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
         "ended": found.reason,
         "given_up": found.refused,
         "at": [{"q": list(q), "state": state} for q, state in zip(wanted, found.wanted, strict=True)],
+        "paths": _shares(found.proof, paths) if paths else [],
         "proof": str(path),
     }
 
@@ -138,6 +150,7 @@ def _written(client: Client, job: str, scene: Document, out: str | None) -> dict
         "ended": found["ended"],
         "given_up": found["given_up"],
         "at": [] if stored is None else stored["at"],
+        "paths": [] if stored is None else stored["paths"],
         "proof": None if path is None else str(path),
     }
 
@@ -148,6 +161,8 @@ def _print(document: dict[str, Any]) -> None:
     print(f"{document['scene']['name']}: {said}, {output.seconds(document['seconds'])}")
     for one in document["at"]:
         print(f"q = {', '.join(f'{value:.6g}' for value in one['q'])}: {output.plain(one['state'])}")
+    for i, share in enumerate(document["paths"]):
+        print(f"path[{i}]: {100 * share:.4g} % of it proved")
     if document["given_up"]:
         print(f"{document['given_up']} pieces of work were given up: the verifier refused what they found")
     if document["ended"] in ENDS:
@@ -156,6 +171,18 @@ def _print(document: dict[str, Any]) -> None:
         print("it has not ended, or has failed: ciris job show says why")
     if proof is not None:
         print(f"proof {proof} (check it: ciris verify {proof})")
+
+
+def _shares(proof: MapProof, paths: list[list[list[float]]]) -> list[float]:
+    """Returns how much of each motion a map proves, as a share of its length."""
+    from certifier.map.free_set import as_file, free_set
+    from ciris.free_set import FreeSet
+
+    try:
+        free = FreeSet.of_bytes(as_file(free_set(proof)), "the free set")
+    except ProofError:
+        return [0.0] * len(paths)  # nothing is proved yet
+    return [free.share_of(path) for path in paths]
 
 
 def _former(path: str) -> MapProof:

@@ -88,6 +88,9 @@ class Map(Kind):
         given = body.options.model_dump()
         for i, q in enumerate(given["at"]):
             check_positions(scene, q, f"options.at[{i}]")
+        for i, path in enumerate(given["paths"]):
+            for j, q in enumerate(path):
+                check_positions(scene, q, f"options.paths[{i}][{j}]")
         return {**asdict(read(MapOptions, given, "options")), "former": None if body.former is None else _former(body.former, db)}
 
     def decide(self, turn: Turn) -> Lead | Finish:

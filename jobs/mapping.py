@@ -20,7 +20,7 @@ from sqlalchemy.orm import Session
 
 from certifier import stored
 from certifier.errors import ProofError
-from certifier.jobs.map import Worker, grow_round, in_s, states_of
+from certifier.jobs.map import Worker, grow_round, in_s, states_of, ways_of
 from certifier.map.free_set import as_file, free_set
 from certifier.map.growing import Growing, Task, Trees
 from certifier.map.options import MapOptions
@@ -29,6 +29,7 @@ from certifier.map.pair import Found
 from certifier.model import Scene
 from certifier.proof.map import MapProof
 from certifier.verify.map import verify_map
+from ciris.free_set import FreeSet
 from db import clock, events, jobs, leases, maps, proofs, steps, workers
 from db import work as queue
 from db.models import JobRow
@@ -297,6 +298,7 @@ def accept(claim: steps.Claim, scene: Scene) -> Done:
         "cells": statement.cells,
         "uncovered_pairs": statement.missing,
         "at": [{"q": list(q), "state": state} for q, state in zip(options.at, states, strict=True)],
+        "paths": [0.0 if file is None else FreeSet.of_bytes(file, "the free set").share_of(path) for path in options.paths],
         "proof": proofs.digest(proof),
         "proof_bytes": len(proof),
         "free_set": file is not None,
@@ -335,7 +337,7 @@ def _resumed(job_id: str, scene: Scene, options: MapOptions) -> _Led:
     """Returns the map after all rounds whose results are kept."""
     led = _led.pop(job_id, None)
     if led is None:
-        led = _Led(Growing(scene, in_s(scene, options.at), options.random_seed, _former_of(job_id)))
+        led = _Led(Growing(scene, in_s(scene, options.at), options.random_seed, _former_of(job_id), ways_of(scene, options.paths)))
     while found := _of_round(job_id, led.rounds):
         pieces = [] if led.begins else _divided(led.growing.round())
         for i, data in found.items():

@@ -34,6 +34,11 @@ class StoredMap(BaseModel):
         description="Number of pairs without any cell. As long as there are some, no configuration is proved free."
     )
     at: list[Wanted] = Field(description="The configurations that the map was to cover first.")
+    paths: list[float] = Field(
+        default=[],
+        description="How much of each motion that the map was to cover first is proved: a share of its length.",
+        examples=[[1.0]],
+    )
     proof: str = Field(description="SHA-256 of the proof file.")
     proof_bytes: int = Field(description="Size of the proof file.")
     free_set: bool = Field(description="Whether there is a free set for lookups: not where a pair has no cell, or the scene no pair.")

@@ -11,6 +11,7 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -61,6 +62,7 @@ def grow_map(
     at: Array | None = None,
     seed: int = 0,
     former: MapProof | None = None,
+    ways: Array | None = None,
 ) -> SceneMap:
     """Grows the map of a scene until it covers this share, or the time is over, or somebody interrupts it.
 
@@ -68,6 +70,7 @@ def grow_map(
         coverage: share of the free configurations to cover.
         at: (D, n) configurations in s that are wanted first.
         former: a map of this scene or another one, which has passed the verifier. What it proves of the same bodies is taken over.
+        ways: (W, 2, n) joint positions q where straight motions begin and end that are wanted first.
     """
     start = time.perf_counter()
     at = np.zeros((0, scene.n)) if at is None else at
@@ -82,7 +85,7 @@ def grow_map(
             said = {"seconds": seconds, "coverage": now.share, "error": now.error, "cells": growing.planes, "looked": growing.looked}
             tell("map", said)
 
-        growing = Growing(scene, at, seed, former)
+        growing = Growing(scene, at, seed, former, ways)
         with _workers(scene, growing, processes, over) as work:
             try:
                 while (reason := grow_round(growing, work, coverage, over)) is None:
@@ -98,6 +101,12 @@ def grow_map(
 def in_s(scene: Scene, at: Sequence[Sequence[float]]) -> Array:
     """Returns joint positions, one row for each configuration, in s."""
     return scene.to_s(scene.in_windows(np.array(at, dtype=float).reshape(-1, scene.n)))
+
+
+def ways_of(scene: Scene, paths: Sequence[Sequence[Sequence[float]]]) -> Array:
+    """Returns where the straight parts of motions begin and end, (W, 2, n) in q; ``paths`` has the waypoints of each motion."""
+    ways = [ends for path in paths for ends in pairwise(path)]
+    return np.array(ways, dtype=float).reshape(-1, 2, scene.n)
 
 
 def states_of(trees: Trees, at: Array) -> list[str]:

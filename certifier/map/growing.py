@@ -40,6 +40,8 @@ HAIR = 1e-8
 """A configuration on a cut is proved if the cells on all sides are: these hold configurations beside it, by HAIR in each joint, radians or
 metres. Lookups need 1e-9 (ciris.free_set).
 """
+ON_WAYS = 512
+"""Before a round, this many configurations are drawn on the motions that were asked for. Those not proved yet weigh DEMAND in all."""
 SIDES, BESIDE = 128, 20_000
 """At most SIDES configurations beside each one that was asked for are looked at, and about BESIDE beside all of them get cells."""
 
@@ -209,14 +211,16 @@ class Growing(Trees):
         at: (D, n) configurations in s that are wanted first; those in collision are left out.
         seed: of every random choice.
         former: as for :class:`Trees`.
+        ways: (W, 2, n) joint positions q where straight motions begin and end that are wanted first.
 
     Attributes:
         looked: how many cells were looked at.
         refused: how many tasks were given up because the verifier refused what they found.
     """
 
-    def __init__(self, scene: Scene, at: Array, seed: int = 0, former: MapProof | None = None) -> None:
+    def __init__(self, scene: Scene, at: Array, seed: int = 0, former: MapProof | None = None, ways: Array | None = None) -> None:
         super().__init__(scene, former)
+        self._ways = np.zeros((0, 2, scene.n)) if ways is None else ways
         self._rng = np.random.default_rng(seed)
         self._samples, self._value = np.zeros((0, scene.n)), np.zeros(0)
         self._open, self.looked = np.zeros(0, np.int64), 0
@@ -284,7 +288,10 @@ class Growing(Trees):
         return Task(name, tree.nodes[rows], numbers, given, samples, of_samples[numbers], DEEPER * len(rows), water)
 
     def _draw(self) -> None:
-        """Draws samples where the map is open, if few are left there."""
+        """Draws samples where the map is open: on the motions that are wanted, and anywhere if few are left there."""
+        if len(self._ways):
+            on_ways = self._on_ways()
+            self._add(on_ways, DEMAND / max(1, len(on_ways)))
         if np.count_nonzero((self._open > 0) & (self._value > 0)) < WANTED:
             self._add(self._drawn(BATCH), 1.0)
 
@@ -309,7 +316,19 @@ class Growing(Trees):
 
     def _drawn(self, count: int) -> Array:
         """Draws configurations and returns those that are free of collision, and that the map does not prove yet, in s."""
-        q = self._rng.uniform(self.scene.q_lower, self.scene.q_upper, size=(count, self.scene.n))
+        return self._left(self._rng.uniform(self.scene.q_lower, self.scene.q_upper, size=(count, self.scene.n)))
+
+    def _on_ways(self) -> Array:
+        """Draws configurations on the motions that are wanted, by their lengths, and returns those that are left, in s."""
+        begin, way = self._ways[:, 0], self._ways[:, 1] - self._ways[:, 0]
+        lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(way, axis=1))])
+        at = lengths[-1] * (np.arange(ON_WAYS) + self._rng.uniform(size=ON_WAYS)) / ON_WAYS
+        which = np.clip(np.searchsorted(lengths, at, side="right") - 1, 0, len(way) - 1)
+        part = (at - lengths[which]) / np.maximum(np.diff(lengths)[which], np.finfo(float).tiny)
+        return self._left(begin[which] + np.clip(part, 0.0, 1.0)[:, None] * way[which])
+
+    def _left(self, q: Array) -> Array:
+        """Returns those of joint positions, (S, n), that are free of collision, and that the map does not prove yet, in s."""
         samples = self.scene.to_s(q)
         samples = samples[~self.contains(samples)] if self.trees else samples
         return samples[self._plan.free(samples)]

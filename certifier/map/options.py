@@ -13,4 +13,7 @@ class MapOptions:
 
     coverage: float = option(0.9, "The map ends when it covers this share of the free configurations.", above=0, greatest=1)
     at: tuple[tuple[float, ...], ...] = option((), "Joint positions that the map is to cover first.", most=10_000)
+    paths: tuple[tuple[tuple[float, ...], ...], ...] = option(
+        (), "Motions that the map is to cover first, straight in joint positions from waypoint to waypoint.", argument="path", most=10_000
+    )
     random_seed: int = option(0, "Seed of every random choice.", least=0, greatest=2**63 - 1)

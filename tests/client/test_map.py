@@ -23,6 +23,20 @@ def test_a_map_is_grown_and_its_file_holds(ciris: Ciris, tmp_path: Path) -> None
     assert (checked.status, checked.json["kind"], checked.json["guarantee"]) == (0, "map", "exact")
 
 
+def test_motions_are_covered_first(ciris: Ciris, tmp_path: Path) -> None:
+    (tmp_path / "way.csv").write_text("0,0\n0.35,-0.1\n")
+    (tmp_path / "through.csv").write_text("0,0\n-1.2,1.0\n")
+    done = ciris("map", PLANAR, "--local", "--coverage", "0.5", "--path", "way.csv", "--json")
+    assert (done.status, done.json["paths"]) == (0, [1.0])
+    partly = ciris("map", PLANAR, "--local", "--coverage", "0.5", "--path", "way.csv", "--path", "through.csv")
+    assert partly.status == 1, "one of the motions ends in the obstacle"
+    first, second = (line for line in partly.stdout.splitlines() if line.startswith("path["))
+    assert first == "path[0]: 100 % of it proved"
+    assert 0 < float(second.removeprefix("path[1]: ").removesuffix(" % of it proved")) < 100
+    wrong = ciris("map", PLANAR, "--local", "--path", "none.csv")
+    assert (wrong.status, wrong.error.startswith("--path: there is no file none.csv")) == (2, True)
+
+
 def test_it_can_be_read_by_programs(ciris: Ciris, tmp_path: Path) -> None:
     found = ciris("map", PLANAR, "--local", "--coverage", "0.5", "--json").json
     assert found["ended"] == "coverage"

@@ -117,7 +117,7 @@ def test_a_map_is_asked_for(opened: Any, url: str, client: TestClient) -> None:
     opened.wait_for_url(f"{url}/jobs/*")
     (job,) = jobs(client)
     assert job["kind"] == "map"
-    assert job["options"] == {"coverage": 0.7, "at": [pytest.approx([0.1, -0.2])], "random_seed": 0, "former": None}
+    assert job["options"] == {"coverage": 0.7, "at": [pytest.approx([0.1, -0.2])], "random_seed": 0, "former": None, "paths": []}
 
 
 def test_what_the_service_refuses_is_said_and_nothing_is_lost(opened: Any, client: TestClient, complaints: list[str]) -> None:

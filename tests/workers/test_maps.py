@@ -99,16 +99,19 @@ def stored_after(client: TestClient, job: JobRow) -> dict[str, Any]:
 
 
 def test_a_map_is_that_of_a_plain_call_and_its_free_set_is_free(client: TestClient, planar: Scene) -> None:
-    job = ended(asked(client, planar, options={"coverage": 0.95, "at": [FREE, HIT]}))
+    ways = [[FREE, HIT]]
+    job = ended(asked(client, planar, options={"coverage": 0.95, "at": [FREE, HIT], "paths": ways}))
     assert (job.state, job.outcome, job.error) == ("succeeded", "certified", None), job.error
     told = found(client, job.id)
-    expected = grow_map(planar, 0.95, at=planar.to_s(np.array([FREE, HIT])))
+    expected = grow_map(planar, 0.95, at=planar.to_s(np.array([FREE, HIT])), ways=np.array(ways))
     assert proof_of(client, job.id) == expected.proof.to_bytes()
     assert (told["coverage"]["value"], told["cells"], told["stored"]["cells"]) == (expected.coverage.share, expected.cells, expected.cells)
     assert [one["state"] for one in told["stored"]["at"]] == ["proved", "in_collision"] == expected.wanted
     assert told["curve"][-1][1] == expected.coverage.share
     free = FreeSet.of_bytes(client.get(f"/v1/jobs/{job.id}/map/free-set").content, "the free set")
     assert free.scene == planar.hash
+    assert told["stored"]["paths"] == [free.share_of(ways[0])]
+    assert 0 < free.share_of(ways[0]) < 1
     q = np.random.default_rng(3).uniform(planar.q_lower, planar.q_upper, size=(20_000, planar.n))
     collides, proved = in_collision(planar, planar.to_s(q)), free.contains(q)
     assert not (collides & proved).any()
@@ -279,3 +282,5 @@ def test_configurations_beyond_the_limits_are_refused(client: TestClient, planar
     refused = client.post("/v1/jobs", json={"kind": "map", "scene": row.id, "options": {"at": [FREE, [9.0, 0.0]]}})
     assert refused.status_code == 422
     assert refused.json()["field"] == "options.at[1][0]"
+    refused = client.post("/v1/jobs", json={"kind": "map", "scene": row.id, "options": {"paths": [[FREE, HIT], [FREE, [9.0, 0.0]]]}})
+    assert (refused.status_code, refused.json()["field"]) == (422, "options.paths[1][1][0]")

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from certifier.errors import ProofError
 from certifier.jobs.map import _adopted, grow_map, grow_round
 from certifier.map.free_set import as_file, free_set
 from certifier.map.growing import Growing
@@ -216,6 +217,30 @@ def test_what_is_wanted_on_a_cut_is_proved_on_all_sides_as_lookups_need_it(n):
     assert any(on_cuts)
     assert free.contains(scene.to_q(at)).tolist() == [state == "proved" for state in grown.wanted]
     assert grown.wanted[0] == "proved"
+
+
+def test_a_motion_that_is_wanted_comes_first():
+    """A motion that is among the last ones without a demand."""
+    scene, rng = planar_arm(3, CROWDED, limit=2.5), np.random.default_rng(0)
+    growing, t = Growing(scene, np.zeros((0, 3))), np.linspace(0.0, 1.0, 200)[:, None]
+    ways = rng.uniform(scene.q_lower, scene.q_upper, size=(300, 2, 3))
+    ways = [way for way in ways if Plan(scene).free(scene.to_s(way[0] + t * (way[1] - way[0]))).all()]
+    grown_until(growing, lambda growing: growing.coverage.share > 0.85)
+    early = [share_of(growing, way) for way in ways]
+    grown_until(growing, lambda growing: growing.coverage.share > 0.95)
+    late = next(way for way, share in zip(ways, early, strict=True) if share < 1.0 and share_of(growing, way) == 1.0)
+    efforts = [
+        grown_until(Growing(scene, np.zeros((0, 3)), ways=ways), lambda growing: share_of(growing, late) == 1.0)
+        for ways in (late[None], None)
+    ]
+    assert efforts[0] < 0.5 * efforts[1]
+
+
+def share_of(growing, path):
+    try:
+        return FreeSet.of_bytes(as_file(free_set(growing.proof())), "here").share_of(path)
+    except ProofError:
+        return 0.0
 
 
 def test_a_map_ends_before_the_verifier_would_not_read_it(monkeypatch):
