@@ -13,6 +13,7 @@ from api.app import create_app
 from api.connections import BoundedProtocol, allow_files
 from certifier.errors import CirisError
 from db import keys, logs, traces
+from db.session import check_version
 from db.settings import settings
 from db.vault import vault
 
@@ -36,6 +37,7 @@ def main() -> None:
     """Serves until a signal ends the process. It refuses an address that others can reach while there are no API keys."""
     logs.configure("api")
     try:
+        check_version(settings().database)
         keys.check_bind(settings())
         vault()  # a key that is none is found out now
     except CirisError as error:

@@ -15,7 +15,7 @@ from starlette.datastructures import Headers
 from starlette.requests import cookie_parser
 
 from certifier.errors import CirisError
-from db import keys
+from db import keys, version
 from db.keys import Ring, Scope
 from db.models import DEFAULT_PROJECT
 from db.session import Database
@@ -47,6 +47,8 @@ class Keyring:
 
     A revoked key is refused after ``KEYS_SECONDS`` at the latest. While the database answers, no request waits for a reading. What
     strangers send is not stored, and makes the keyring read the database at most once in ``AGAIN_SECONDS``.
+
+    It does not read a database of another version: ``database_version`` refuses every caller until the database is of this one.
     """
 
     def __init__(self, database: Database, *, open_without_keys: bool) -> None:
@@ -100,6 +102,7 @@ class Keyring:
 
     def _read(self) -> Ring:
         with self._database.read() as session:
+            version.check(session)
             return keys.ring(session)
 
 

@@ -59,7 +59,7 @@ _STATUS_OF_CODE = {
     "scope_missing": HTTPStatus.FORBIDDEN,
     "too_many_requests": HTTPStatus.TOO_MANY_REQUESTS,
     "quota_exceeded": HTTPStatus.TOO_MANY_REQUESTS,
-    **dict.fromkeys(("busy", "no_room", "database_unavailable"), HTTPStatus.SERVICE_UNAVAILABLE),
+    **dict.fromkeys(("busy", "no_room", "database_unavailable", "database_version"), HTTPStatus.SERVICE_UNAVAILABLE),
     "malformed_json": HTTPStatus.BAD_REQUEST,
     "internal": HTTPStatus.INTERNAL_SERVER_ERROR,
 }

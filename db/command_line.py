@@ -1,4 +1,4 @@
-"""This module runs commands that act on the database of the settings: ``ciris key`` and ``ciris project``."""
+"""This module runs commands that act on the database of the settings: ``ciris key``, ``ciris project`` and ``ciris db``."""
 
 from __future__ import annotations
 
@@ -14,26 +14,50 @@ from sqlalchemy.engine import make_url
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from db import migrate
-from db.session import Database
+from db.disk import lacks_room
+from db.session import UNAVAILABLE, Database
 from db.settings import Settings
 
 
 def on_database(data: Path | None, change: Callable[[Session], list[str]]) -> list[str]:
-    """Migrates the database if that is needed, makes a change in one transaction, and returns the lines that it has to say.
+    """Makes a change in one transaction, and returns the lines that it has to say.
 
-    An error of the user's ends the process with status 2 and leaves the database as it was. No database is made: the directory may be
-    misspelt.
+    No database is made: the directory may be misspelt. None is migrated: processes of an older version may use it.
+    """
+
+    def changed(url: str) -> list[str]:
+        check_there(url)
+        with closing(Database(url)) as database, database.write() as session:
+            return change(session)
+
+    return on_url(data, changed)
+
+
+def on_url(data: Path | None, act: Callable[[str], list[str]]) -> list[str]:
+    """Does something with the database of the settings, and returns the lines that it has to say.
+
+    An error of the user's ends the process with status 2 and leaves the database as it was.
+
+    Args:
+        data: the data directory; None for that of the settings.
     """
     settings = Settings() if data is None else Settings(data_dir=data)
     try:
-        check_there(settings.database)
-        migrate.upgrade(settings.database)
-        with closing(Database(settings.database)) as database, database.write() as session:
-            return change(session)
+        try:
+            return act(settings.database)
+        except UNAVAILABLE as error:
+            raise _unavailable(error) from None
     except CirisError as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(2)
+
+
+def _unavailable(error: Exception) -> CirisError:
+    """Returns what to say of an error of the database. A link's own words may have the password in them."""
+    if lacks_room(error):
+        return CirisError("no_room", "the disk is full, or cannot be written", field="database", hint="free some room; nothing was changed")
+    problem = f"the database cannot be used: {type(getattr(error, 'orig', None) or error).__name__}"
+    return CirisError("no_database", problem, field="CIRIS_DATABASE_URL", hint="does its server run, and are name and password right?")
 
 
 def check_there(url: str) -> None:
@@ -44,7 +68,7 @@ def check_there(url: str) -> None:
     """
     parsed = make_url(url)
     if parsed.get_backend_name() == "sqlite" and not Path(parsed.database or "").exists():
-        hint = "is it spelt so? `ciris up` and `python -m db.migrate` make one"
+        hint = "is it spelt so? `ciris up` and `ciris db upgrade` make one"
         raise CirisError("no_database", f"there is none at {parsed.database}", field="database", hint=hint)
 
 

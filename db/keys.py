@@ -150,7 +150,7 @@ def check_bind(settings: Settings) -> None:
         with database.read() as session:
             guarded = exist(session)
     except SQLAlchemyError:
-        hint = "is it there, and migrated (`python -m db.migrate`)?"
+        hint = "is it there, and migrated (`ciris db upgrade`)?"
         raise CirisError("no_database", "the database cannot be used", field="CIRIS_DATABASE_URL", hint=hint) from None
     finally:
         database.close()
@@ -169,7 +169,7 @@ def _digest(key: str) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Runs ``ciris key`` on the database that the settings name. It migrates the database first if that is needed."""
+    """Runs ``ciris key`` on the database that the settings name."""
     parser = command_line.Parser(prog="ciris key", description="The API keys of the service whose database the settings name.")
     parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")
     verbs = parser.add_subparsers(dest="verb", required=True)

@@ -1,6 +1,7 @@
-"""This module brings a database to a version of the schema.
+"""This module brings a database to a revision of its tables, up or down (``ciris db``, ``ciris up``).
 
-``python -m db.migrate`` brings the database of the settings to the newest version.
+A migration is one transaction: it happens as a whole or not at all. Nobody else writes meanwhile, and no worker may live that would go
+on afterwards with a database that it does not know.
 """
 
 from __future__ import annotations
@@ -14,20 +15,21 @@ from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
-from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, event
+from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
+from db import version, workers
 from db.models import Base
 from db.session import Database
-from db.settings import settings
 
-_ADVISORY_LOCK = 0x43495249  # "CIRI" in ASCII; who migrates a PostgreSQL database holds this lock
+BASE = "base"
+"""Alembic's name for a database from which everything is taken away."""
 
 
 @contextmanager
 def connection_for_migrations(url: str) -> Iterator[Connection]:
-    """Opens a connection in a transaction that excludes other migrations.
+    """Opens a connection in a transaction that excludes other migrations, and processes that write.
 
     On SQLite foreign keys are off in it. There, a migration changes a table by making a new one and dropping the old one; with foreign
     keys on, that would delete the rows of other tables that refer to it.
@@ -38,28 +40,65 @@ def connection_for_migrations(url: str) -> Iterator[Connection]:
     try:
         with database.writer.begin() as connection:
             if not database.sqlite:
-                connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({_ADVISORY_LOCK})")
+                connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({version.LOCK})")
             yield connection
     finally:
         database.close()
 
 
-def upgrade(url: str, revision: str = "head") -> None:
-    """Migrates up to ``revision``. Nothing happens when the database is there already.
+def upgrade(url: str, revision: str | None = None) -> tuple[str | None, str]:
+    """Migrates up to ``revision``; default: the newest one. Nothing happens when the database is there already.
+
+    Returns the revision of before, None for a database without tables, and the one of now.
 
     Raises:
-        CirisError: database_version.
+        CirisError: database_version, unknown_revision, workers_live.
+    """
+    aim = version.revisions()[-1] if revision is None else revision
+    with connection_for_migrations(url) as connection:
+        before = known_revision(connection)
+        _check_aim(aim, version.revisions()[version.revisions().index(before) if before else 0 :], before)
+        if before != aim:
+            _check_nobody_works(connection, before)
+            raise_to(connection, aim)
+    _let_it_shrink(url)
+    return before, aim
+
+
+def downgrade(url: str, revision: str) -> str:
+    """Migrates down to ``revision``, and returns the one of before. What the older tables cannot hold is lost.
+
+    Args:
+        revision: ``base`` takes every table away.
+
+    Raises:
+        CirisError: database_version, unknown_revision, workers_live.
     """
     with connection_for_migrations(url) as connection:
-        _check(connection)
-        command.upgrade(_config(connection), revision)
-    _let_it_shrink(url)
-
-
-def downgrade(url: str, revision: str) -> None:
-    """Migrates down to ``revision``. ``base`` is the empty database."""
-    with connection_for_migrations(url) as connection:
+        before = known_revision(connection)
+        if before is None:
+            raise version.refusal(None)
+        _check_aim(revision, (BASE, *version.revisions()[: version.revisions().index(before) + 1]), before)
+        _check_nobody_works(connection, before)
         command.downgrade(_config(connection), revision)
+    return before
+
+
+def raise_to(connection: Connection, revision: str) -> None:
+    """Migrates up to ``revision`` in the transaction of the connection."""
+    command.upgrade(_config(connection), revision)
+
+
+def known_revision(connection: Connection) -> str | None:
+    """Returns the revision of a database; None where it has no tables.
+
+    Raises:
+        CirisError: database_version, when this version of the program does not know it.
+    """
+    current = MigrationContext.configure(connection).get_current_revision()
+    if current is not None and current not in version.revisions():
+        raise version.refusal(current)
+    return current
 
 
 def drift(url: str) -> list[Any]:
@@ -68,14 +107,26 @@ def drift(url: str) -> list[Any]:
         return list(compare_metadata(MigrationContext.configure(connection), Base.metadata))
 
 
-def _check(connection: Connection) -> None:
-    """Refuses a database of a version that this one does not know."""
-    current = MigrationContext.configure(connection).get_current_revision()
-    known = [script.revision for script in ScriptDirectory.from_config(_config(connection)).walk_revisions()]
-    if current is not None and current not in known:
-        problem = f"the database is at revision {current}, and this version knows {min(known)} to {max(known)}"
-        hint = "for a smaller revision, start version 0.1.0 on the database once; for a larger one, install the version that made it"
-        raise CirisError("database_version", problem, field="CIRIS_DATABASE_URL", hint=hint)
+def _check_aim(aim: str, may: tuple[str, ...], now: str | None) -> None:
+    if aim not in may:
+        problem = f"no way leads from the revision {now or BASE} to {aim!r}"
+        raise CirisError("unknown_revision", problem, field="revision", hint=f"name one of {', '.join(may)}")
+
+
+def _check_nobody_works(connection: Connection, revision: str | None) -> None:
+    """Refuses to migrate while workers live. Each of them holds work, and those of earlier versions would go on.
+
+    Raises:
+        CirisError: workers_live.
+    """
+    if revision is None:
+        return
+    with Session(bind=connection) as session:
+        living = workers.living(session)
+    if living:
+        problem = f"these workers live, and would go on with it: {', '.join(living)}"
+        hint = "stop them, or drain them (`ciris worker drain`); one that was killed counts for a minute"
+        raise CirisError("workers_live", problem, field="CIRIS_DATABASE_URL", hint=hint)
 
 
 def _let_it_shrink(url: str) -> None:
@@ -99,4 +150,4 @@ def _config(connection: Connection) -> Config:
 
 
 if __name__ == "__main__":
-    upgrade(settings().database)
+    raise SystemExit("error: nothing was migrated; `ciris db upgrade` does that now")

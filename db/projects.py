@@ -71,7 +71,7 @@ def expires() -> ColumnElement[bool]:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Runs ``ciris project`` on the database that the settings name. It migrates the database first if that is needed."""
+    """Runs ``ciris project`` on the database that the settings name."""
     parser = command_line.Parser(prog="ciris project", description="The projects of the service whose database the settings name.")
     parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")
     verbs = parser.add_subparsers(dest="verb", required=True)

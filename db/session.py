@@ -22,7 +22,7 @@ import copy
 import json
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,7 @@ from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import DisconnectionError, InterfaceError, OperationalError, TimeoutError
 from sqlalchemy.orm import DeclarativeBase, ORMExecuteState, Session, with_loader_criteria
 
+from db import version
 from db.disk import Disk
 from db.models import Owned
 from db.settings import settings
@@ -118,8 +119,13 @@ class Database:
 
     @contextmanager
     def write(self) -> Iterator[Session]:
-        """Opens a transaction that may write. It commits at the end, and rolls back when an exception leaves the block."""
+        """Opens a transaction that may write. It commits at the end, and rolls back when an exception leaves the block.
+
+        Raises:
+            CirisError: database_version, when the database is of another version than this program.
+        """
         with Session(self.writer, expire_on_commit=False, info=self._info()) as session, session.begin():
+            version.hold(session)
             yield session
 
     def _info(self) -> dict[str, Any]:
@@ -191,6 +197,16 @@ def insert_new(session: Session, model: type[DeclarativeBase], rows: list[dict[s
 def database() -> Database:
     """Returns the database of the settings, one for the process. A forked child must call ``database.cache_clear()`` first."""
     return Database(settings().database)
+
+
+def check_version(url: str) -> None:
+    """Refuses a database of another version. One that cannot be reached yet is refused later, by who writes to it.
+
+    Raises:
+        CirisError: database_version.
+    """
+    with closing(Database(url)) as tried, suppress(*UNAVAILABLE), tried.read() as session:
+        version.check(session)
 
 
 def _strict_json(value: Any) -> str:

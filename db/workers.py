@@ -122,6 +122,12 @@ def gone(session: Session) -> Sequence[str]:
     return [id for id, process, lives in rows if not lives or leases.is_alive(process) is False]
 
 
+def living(session: Session) -> list[str]:
+    """Returns the processes of the workers that live, with their versions. It reads columns that the table has had at every revision."""
+    rows = session.execute(select(WorkerRow.process, WorkerRow.version).where(_lives(session)).order_by(WorkerRow.process))
+    return [f"{process} (version {of})" for process, of in rows if leases.is_alive(process) is not False]
+
+
 def forget(session: Session, ids: Sequence[str]) -> None:
     """Deletes the rows of workers that are gone."""
     session.execute(delete(WorkerRow).where(WorkerRow.id.in_(ids)))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import sys
 import threading
 import warnings
 from typing import Any
@@ -30,10 +31,11 @@ def main() -> None:
     from celery.signals import setup_logging, worker_process_init, worker_process_shutdown, worker_ready
     from celery.utils.log import get_multiprocessing_logger
 
+    from certifier.errors import CirisError
     from certifier.isolation.child import prepare
     from certifier.orphans import die_with_parent
     from db import logs, traces
-    from db.session import database
+    from db.session import check_version, database
     from db.settings import settings
     from db.workers import WorkerKind
     from workers.app import CONTROL, SOLVE, celery_app
@@ -50,6 +52,10 @@ def main() -> None:
     stop, worker = threading.Event(), os.getpid()
 
     logs.configure(queue)
+    try:
+        check_version(settings().database)
+    except CirisError as error:
+        parser.exit(2, f"error: {error}\n")
     if queue == SOLVE:
         from certifier.jobs import kernels
 
@@ -108,6 +114,8 @@ def main() -> None:
     stop.set()
     presence.leave()
     traces.end()
+    if presence.refused:
+        sys.exit(os.EX_UNAVAILABLE)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """A worker says in the database that it lives and what it does, and does what people want of it: it runs, pauses or drains.
 
 A paused worker takes no message from its queue, and a draining one ends with status 0 when it has finished what it holds. Messages that
-it leaves are there for the other workers: each worker that claims a piece and leaves more sends the next message.
+it leaves are there for the other workers: each worker that claims a piece and leaves more sends the next message. A worker whose database
+has been migrated to another version ends at once: it could not save what it finds.
 """
 
 from __future__ import annotations
@@ -10,12 +11,13 @@ import logging
 import os
 import threading
 import time
-from importlib.metadata import version
+from importlib import metadata
 from typing import Any
 
 from celery.worker import state as celery_state
 
-from db import machine, workers
+from certifier.errors import CirisError
+from db import machine, version, workers
 from db.leases import this_worker
 from db.session import UNAVAILABLE, Database
 from db.settings import settings
@@ -42,11 +44,16 @@ class Presence:
     Args:
         ended: set when the worker ends.
         troubles: what fails of what the worker does again and again.
+
+    Attributes:
+        refused: True once the database is of another version. The worker ends then.
     """
+
+    refused = False
 
     def __init__(self, kind: WorkerKind, ended: threading.Event, troubles: Troubles) -> None:
         processes = settings().solve_processes if kind is WorkerKind.SOLVE else 1
-        self._made = Made(this_worker(), kind, version("ciris"), processes, machine.cores(), machine.memory_bytes())
+        self._made = Made(this_worker(), kind, metadata.version("ciris"), processes, machine.cores(), machine.memory_bytes())
         self._ended, self._troubles = ended, troubles
         self._state = self._wanted = WorkerState.RUNNING
         self._told: float | None = None
@@ -67,6 +74,10 @@ class Presence:
                     self._wanted = self._look()
             except UNAVAILABLE as error:
                 log.warning("the database cannot be reached; this worker goes on as it is (%s): %s", self._state, type(error).__name__)
+            except CirisError as error:
+                log.error("this worker ends, and gives back what it holds: %s", error)
+                self.refused = celery_state.should_terminate = True
+                return
             except Exception:
                 log.exception("this worker could not tell of itself; trying again")
             if self._state is WorkerState.DRAINING and not celery_state.reserved_requests:
@@ -82,14 +93,19 @@ class Presence:
         try:
             with self._visit, self._database.write() as session:
                 workers.leave(session, self._made.process)
-        except UNAVAILABLE as error:
-            log.warning("the database cannot be reached; this worker is forgotten later: %s", type(error).__name__)
+        except (CirisError, *UNAVAILABLE) as error:
+            log.warning("the database cannot be used; this worker is forgotten later: %s", type(error).__name__)
 
     def _look(self) -> WorkerState:
-        """Returns what is wanted, and says what the worker does and what fails where that is due, or news."""
+        """Returns what is wanted, and says what the worker does and what fails where that is due, or news.
+
+        Raises:
+            CirisError: database_version, when the database has been migrated to another version.
+        """
         trouble = self._troubles.said()
         if self._told is not None and trouble == self._told_of and time.monotonic() - self._told < TELL_SECONDS:
             with self._database.read() as session:
+                version.check(session)
                 wanted = workers.wanted(session, self._made.process)
             if wanted is not None:
                 return wanted

@@ -5,12 +5,13 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response, status
 from kombu.exceptions import OperationalError
 from redis.exceptions import RedisError
-from sqlalchemy import text
 from sqlalchemy.exc import SQLAlchemyError
 
 from api import metrics
 from api.access import READ, WholeDb
 from api.schemas.service import Health, Readiness
+from certifier.errors import CirisError
+from db import version
 from db.session import Database
 from db.statistics import collect
 from workers.app import CONTROL, SOLVE, waiting
@@ -57,7 +58,9 @@ def get_metrics(request: Request, db: WholeDb) -> Response:
 def _database(db: Database) -> str:
     try:
         with db.read() as session:
-            session.execute(text("SELECT 1 FROM jobs LIMIT 1"))
+            version.check(session)
+    except CirisError as error:
+        return error.message
     except SQLAlchemyError as error:
         return f"cannot be used: {type(error).__name__}"
     return "ok"

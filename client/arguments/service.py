@@ -37,6 +37,25 @@ def add(verbs: Any) -> None:
     limits.add_argument("--keep-days", metavar="DAYS", help="delete a job's data, except its regions, DAYS days after its end; 0: never")
     limits.set_defaults(run="client.commands:in_database", module="db.projects", words=_limits)
 
+    kept = group(verbs.add_parser("db", help="migrate, back up and restore this machine's database, or that of CIRIS_DATABASE_URL"))
+    newest = kept.add_parser("upgrade", parents=[database], help="bring the tables to the newest revision; makes them where there are none")
+    newest.set_defaults(words=lambda args: ["upgrade"])
+    older = kept.add_parser(
+        "downgrade",
+        parents=[database],
+        help="bring the tables to an older revision; what they cannot hold is lost: make a backup before",
+    )
+    older.add_argument("revision", metavar="REVISION", help="a revision, such as 0031; base takes every table away")
+    older.set_defaults(words=lambda args: ["downgrade", args.revision])
+    out = kept.add_parser("backup", parents=[database], help="write every row, proofs included, into a new file; the service may run")
+    out.add_argument("file", metavar="FILE", help="the new file, an SQLite database")
+    out.set_defaults(words=lambda args: ["backup", args.file])
+    back = kept.add_parser("restore", parents=[database], help="fill a database that is empty from a backup")
+    back.add_argument("file", metavar="FILE", help="a file of `ciris db backup`, of SQLite or of PostgreSQL")
+    back.set_defaults(words=lambda args: ["restore", args.file])
+    for verb in (newest, older, out, back):
+        verb.set_defaults(run="client.commands:in_database", module="db.commands")
+
     key = group(verbs.add_parser("key", help="make, list and revoke API keys: in this machine's database, or with --url over HTTP"))
     over_http = Parser(add_help=False)
     over_http.add_argument("--url", help="URL of a service; then an admin's key of it manages the keys of its own project")

@@ -25,6 +25,8 @@ def run(connection: Connection) -> None:
 given: Connection | None = context.config.attributes.get("connection")
 if given is not None:
     run(given)
-else:
+elif getattr(context.config.cmd_opts, "autogenerate", False):
     with connection_for_migrations(settings().database) as connection:
         run(connection)
+else:
+    raise SystemExit("alembic only writes new migrations here; `ciris db` migrates")

@@ -12,7 +12,7 @@ import httpx2
 import pytest
 from fastapi.routing import APIRoute
 from fastapi.testclient import TestClient
-from sqlalchemy import event
+from sqlalchemy import event, text
 from sqlalchemy.exc import OperationalError
 from starlette.routing import Mount
 
@@ -23,7 +23,7 @@ from api.limits import MAX_BUCKETS, Buckets
 from certifier.errors import CirisError
 from certifier.model import Scene
 from ciris.synchronous.client import Client
-from db import events, jobs, keys
+from db import events, jobs, keys, version
 from db.keys import Scope
 from db.session import Database
 from tests.api.conftest import BASE_URL, PROBLEM
@@ -354,3 +354,24 @@ def test_a_key_that_cannot_be_sent_is_refused_without_being_shown(monkeypatch: p
     with pytest.raises(CirisError) as caught:
         api_key()
     assert value not in str(caught.value)
+
+
+def test_a_database_of_another_version_is_not_served(client: TestClient, database: Database) -> None:
+    def at(revision: str) -> None:
+        with database.writer.begin() as connection:
+            connection.execute(text("UPDATE alembic_version SET version_num = :revision"), {"revision": revision})
+
+    assert client.get("/v1/jobs").status_code == 200
+    at("9999")
+    time.sleep(KEYS_SECONDS)
+    for method, route in (("GET", "/v1/jobs"), ("GET", "/"), ("POST", "/v1/scenes")):
+        answer = client.request(method, route)
+        assert answer.status_code == 503
+        assert "the database is at revision 9999, and this version of ciris" in answer.text
+    assert client.get("/v1/jobs").json()["code"] == "database_version"
+    ready = client.get("/readyz")
+    assert (ready.status_code, client.get("/healthz").status_code) == (503, 200)
+    assert ready.json()["checks"]["database"].startswith("the database is at revision 9999")
+    at(version.revisions()[-1])
+    assert client.get("/v1/jobs").status_code == 200
+    assert client.get("/readyz").json()["checks"]["database"] == "ok"

@@ -33,7 +33,7 @@ def test_an_address_that_others_can_reach_is_refused_without_keys(tmp_path: Path
 def test_a_database_that_cannot_tell_is_no_permission(tmp_path: Path) -> None:
     done = serve(tmp_path)
     assert done.returncode == 2
-    assert done.stderr.startswith("error: CIRIS_DATABASE_URL: the database cannot be used")
+    assert done.stderr.startswith("error: CIRIS_DATABASE_URL: the database has no tables of ciris")
 
 
 def test_the_stack_refuses_too(tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ def test_no_command_but_up_makes_a_database(tmp_path: Path, words: tuple[str, ..
     data = tmp_path / "misspelt"
     done = subprocess.run(command(*words, "--data", data), env=surroundings(), capture_output=True, text=True, check=False)
     where = data / "ciris.sqlite3"
-    hint = "is it spelt so? `ciris up` and `python -m db.migrate` make one"
+    hint = "is it spelt so? `ciris up` and `ciris db upgrade` make one"
     assert (done.returncode, done.stderr) == (2, f"error: database: there is none at {where} ({hint})\n")
     assert not data.exists()
 

@@ -13,7 +13,7 @@ from client.arguments import EPILOG, parser
 
 PAGE = Path(__file__).parents[2] / "docs" / "commands.md"
 GROUPS = {
-    "The service": ("up", "doctor", "key", "project", "worker"),
+    "The service": ("up", "doctor", "db", "key", "project", "worker"),
     "Scenes": ("scene",),
     "Regions": ("grow", "map", "free-set", "cover", "recertify", "certify", "region"),
     "Jobs": ("job",),

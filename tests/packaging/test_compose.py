@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from client.arguments import parser
 from db import traces
 from db.settings import Settings
 from tests.rooms import ROOMS
@@ -29,7 +30,9 @@ def test_the_services() -> None:
 
 
 def test_the_commands_exist() -> None:
-    for name in OURS:
+    ciris, *words = SERVICES["migrate"]["command"]
+    assert (ciris, parser().parse_args(words).module) == ("ciris", "db.commands")
+    for name in OURS[1:]:
         python, option, module, *_ = SERVICES[name]["command"]
         assert (python, option) == ("python", "-m")
         spec = find_spec(module)

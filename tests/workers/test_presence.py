@@ -9,9 +9,10 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from sqlalchemy import text
 
 from certifier.model import Scene
-from db import machine, workers
+from db import machine, version, workers
 from db.leases import name_of
 from db.models import WorkerRow
 from db.session import database
@@ -144,3 +145,21 @@ def test_processes_that_die_are_replaced_while_the_worker_tells_of_itself(crew: 
     began = seen(crew, "solve").seen_at
     eventually(lambda: seen(crew, "solve").seen_at > began, "it tells that it lives", 30)
     assert job_of(job).state == "succeeded"
+
+
+def test_workers_of_another_version_end_and_say_what_to_do(crew: Service) -> None:
+    """Somebody migrates the database to a version that they do not know."""
+    newest = version.revisions()[-1]
+    with database().writer.begin() as connection:
+        connection.execute(text("UPDATE alembic_version SET version_num = '9999'"))
+    try:
+        for name in ("control", "solve"):
+            assert eventually(lambda name=name: crew.status(name), f"{name} ends", 60) == os.EX_UNAVAILABLE  # type: ignore[misc]
+        crew.start("solve-2")
+        assert eventually(lambda: crew.status("solve-2"), "it does not start", 60) == 2
+        assert crew.log().count("this worker ends, and gives back what it holds: CIRIS_DATABASE_URL: the database is at revision 9999") == 2
+        assert "error: CIRIS_DATABASE_URL: the database is at revision 9999, and this version of ciris" in crew.log()
+        assert f"works with {newest} (install the version of ciris that migrated it" in crew.log()
+    finally:
+        with database().writer.begin() as connection:
+            connection.execute(text(f"UPDATE alembic_version SET version_num = '{newest}'"))

@@ -1,0 +1,258 @@
+"""A backup is one SQLite file with every row of the database, proofs included, as of one moment. It does not matter of which kind the
+database was: the file can be restored into SQLite and into PostgreSQL.
+
+A file is written beside its place and put there when it is whole and on the disk. A database is restored in one transaction, or put in
+place as a whole file. So what fails half way leaves everything as it was.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import JSON, Connection, DateTime, LargeBinary, MetaData, Select, Table, Text, cast, create_engine, insert, inspect, select
+from sqlalchemy.engine import make_url
+from sqlalchemy.types import NullType
+
+from certifier.errors import CirisError, unreadable
+from db import migrate, version
+from db.session import Database
+from db.types import Utc
+
+_VERSIONS = "alembic_version"
+_ROWS, _LARGE_ROWS = 500, 1
+"""This many rows are in memory at once; of tables with files, which may have 100 MB each, the second number."""
+_FIELD = "FILE"
+
+
+def backup(url: str, path: Path) -> str:
+    """Writes the database into a new file, whichever revision it is at, and returns the revision. Others may work on it meanwhile.
+
+    Raises:
+        CirisError: file_exists, unwritable, database_version; damaged_backup, when what was read is not whole.
+    """
+    if path.exists():
+        raise CirisError("file_exists", f"there is a file {path} already", field=_FIELD, hint="name another, or take this one away")
+    database = Database(url)
+    try:
+        with _new_file(path) as partial:
+            revision = (_backup_sqlite if database.sqlite else _backup_postgresql)(database, partial)
+            _check_whole(partial)
+    finally:
+        database.close()
+    return revision
+
+
+def restore(url: str, path: Path) -> str:
+    """Fills a database that is empty from the file, and returns its revision.
+
+    Raises:
+        CirisError: not_a_backup, damaged_backup, unwritable; database_version, when this version does not know the file's revision;
+            not_empty, when the database has tables.
+    """
+    revision = _check_whole(path)
+    parsed = make_url(url)
+    if parsed.get_backend_name() == "sqlite":
+        _restore_sqlite(path, Path(parsed.database or ""))
+    else:
+        _restore_postgresql(url, path, revision)
+    return revision
+
+
+def _backup_sqlite(database: Database, partial: Path) -> str:
+    with database.reader.connect() as connection:
+        revision = _known(connection)
+    with closing(database.reader.raw_connection()) as raw:
+        raw.cursor().execute("VACUUM INTO ?", (str(partial),))
+    return revision
+
+
+def _backup_postgresql(database: Database, partial: Path) -> str:
+    snapshot = database.writer.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
+    with snapshot.begin() as source:
+        source.exec_driver_sql("SET LOCAL idle_in_transaction_session_timeout = 0")  # the file's disk may take its time
+        revision = _known(source)
+        migrate.upgrade(f"sqlite:///{partial}", revision)
+        with migrate.connection_for_migrations(f"sqlite:///{partial}") as target:
+            _copy(source, target)
+            for table, last in _last_ids(source).items():
+                target.exec_driver_sql("UPDATE sqlite_sequence SET seq = ? WHERE name = ?", (last, table))
+    with closing(sqlite3.connect(partial)) as file:
+        file.execute("PRAGMA journal_mode=DELETE")  # so that the backup is one file
+    return revision
+
+
+def _restore_sqlite(path: Path, place: Path) -> None:
+    if place.exists():
+        with closing(sqlite3.connect(f"file:{place}?mode=ro", uri=True)) as there:
+            _check_empty(there.execute("SELECT count(*) FROM sqlite_master").fetchone()[0] == 0, str(place))
+    _check_empty(not place.with_name(f"{place.name}-wal").exists(), f"{place}-wal")
+    place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    with _new_file(place) as partial:
+        shutil.copyfile(path, partial)
+
+
+def _restore_postgresql(url: str, path: Path, revision: str) -> None:
+    """Makes the tables and fills them, in one transaction. Keys to other rows are checked at its end, as rows may refer to later ones."""
+    source_engine = create_engine(f"sqlite:///file:{path.absolute()}?mode=ro&uri=true")
+    try:
+        with source_engine.connect() as source, migrate.connection_for_migrations(url) as target:
+            target.exec_driver_sql("SET LOCAL idle_in_transaction_session_timeout = 0")
+            _check_empty(set(inspect(target).get_table_names()) <= {_VERSIONS}, target.engine.url.database or "")
+            migrate.raise_to(target, revision)
+            keys = target.exec_driver_sql(
+                "SELECT conrelid::regclass::text, quote_ident(conname) FROM pg_constraint WHERE contype = 'f'"
+                " AND connamespace = current_schema()::regnamespace"
+            ).all()
+            for table, key in keys:
+                target.exec_driver_sql(f"ALTER TABLE {table} ALTER CONSTRAINT {key} DEFERRABLE INITIALLY DEFERRED")
+            _copy(source, target)
+            target.exec_driver_sql("SET CONSTRAINTS ALL IMMEDIATE")
+            for table, key in keys:
+                target.exec_driver_sql(f"ALTER TABLE {table} ALTER CONSTRAINT {key} NOT DEFERRABLE")
+            for table, last in _last_ids(source).items():
+                target.exec_driver_sql("SELECT setval(pg_get_serial_sequence(%s, 'id'), %s)", (table, last))
+    finally:
+        source_engine.dispose()
+
+
+def _copy(source: Connection, target: Connection) -> None:
+    """Copies every row between two databases of the same revision, whatever rows a migration has made in the target."""
+    tables, into = _tables(source), _tables(target)
+    assert {table.name: set(table.c.keys()) for table in tables} == {table.name: set(table.c.keys()) for table in into}, "one revision"
+    of = {table.name: table for table in into}
+    for table in reversed(into):
+        target.execute(table.delete())
+    for table in tables:
+        large = any(isinstance(column.type, LargeBinary) for column in table.c)
+        together = _LARGE_ROWS if large else _ROWS
+        rows = source.execute(_all(table), execution_options={"yield_per": together})
+        for part in rows.mappings().partitions():
+            target.execute(insert(of[table.name]), [dict(row) for row in part])
+
+
+def _tables(connection: Connection) -> list[Table]:
+    """Returns the tables as the database has them, those first that others refer to. Their columns take what those of the other kind give:
+    times with their zone, and documents as the text that is stored.
+    """
+    metadata = MetaData()
+    metadata.reflect(connection)
+    for table in metadata.tables.values():
+        for column in table.c:
+            if isinstance(column.type, DateTime):
+                column.type = Utc()
+            elif isinstance(column.type, JSON):
+                column.type = NullType()
+    return [table for table in metadata.sorted_tables if table.name != _VERSIONS]
+
+
+def _all(table: Table) -> Select[Any]:
+    return select(*(cast(column, Text).label(column.name) if isinstance(column.type, NullType) else column for column in table.c))
+
+
+def _last_ids(connection: Connection) -> dict[str, int]:
+    """Returns the last id that each table which counts its rows has given, also to a row that is gone: clients may know it."""
+    if connection.dialect.name == "sqlite":
+        counted = [table for table in inspect(connection).get_table_names() if table != _VERSIONS]
+        last = dict(connection.exec_driver_sql("SELECT name, seq FROM sqlite_sequence").tuples().all())
+        for table in counted:
+            columns = {column["name"]: column["type"] for column in inspect(connection).get_columns(table)}
+            if str(columns.get("id")) == "INTEGER":
+                found = connection.exec_driver_sql(f'SELECT max(id) FROM "{table}"').scalar()
+                last[table] = max(last.get(table, 0), found or 0)
+        return {table: number for table, number in last.items() if number}
+    owned = connection.exec_driver_sql(
+        "SELECT c.relname, s.last_value FROM pg_class c JOIN pg_depend d ON d.refobjid = c.oid AND d.deptype IN ('a', 'i')"
+        " JOIN pg_class q ON q.oid = d.objid AND q.relkind = 'S' JOIN pg_namespace n ON n.oid = q.relnamespace"
+        " JOIN pg_sequences s ON s.schemaname = n.nspname AND s.sequencename = q.relname"
+        " WHERE n.nspname = current_schema() AND s.last_value IS NOT NULL"
+    )
+    return {str(table): int(last) for table, last in owned}
+
+
+def _known(connection: Connection) -> str:
+    revision = migrate.known_revision(connection)
+    if revision is None:
+        raise version.refusal(None)
+    return revision
+
+
+def _check_empty(empty: bool, what: str) -> None:
+    if not empty:
+        hint = "name a new one in CIRIS_DATABASE_URL or --data; nothing was changed"
+        raise CirisError("not_empty", f"{what} is not empty, and a backup would replace what it holds", field="database", hint=hint)
+
+
+def _check_whole(path: Path) -> str:
+    """Returns the revision of a backup that is whole: its pages, its keys to other rows, and each proof by its digest.
+
+    Raises:
+        CirisError: not_a_backup, damaged_backup, database_version.
+    """
+    try:
+        path.open("rb").close()
+        with closing(sqlite3.connect(f"file:{path.absolute()}?mode=ro", uri=True)) as file:
+            return _check_rows(file, path)
+    except OSError as error:
+        raise CirisError("not_a_backup", f"{path}: {unreadable(error)}", field=_FIELD, hint="name a file of `ciris db backup`") from None
+    except sqlite3.DatabaseError as error:
+        raise _damaged(path, str(error)) from None
+
+
+def _check_rows(file: sqlite3.Connection, path: Path) -> str:
+    if not file.execute("SELECT 1 FROM sqlite_master WHERE name = ?", (_VERSIONS,)).fetchone():
+        raise CirisError("not_a_backup", f"{path} has no tables of ciris", field=_FIELD, hint="name a file of `ciris db backup`")
+    revision = file.execute(f"SELECT version_num FROM {_VERSIONS}").fetchone()
+    if revision is None or revision[0] not in version.revisions():
+        raise version.refusal(revision and revision[0])
+    (said,) = file.execute("PRAGMA integrity_check(1)").fetchone()
+    if said != "ok":
+        raise _damaged(path, said)
+    if broken := file.execute("PRAGMA foreign_key_check").fetchone():
+        raise _damaged(path, f"a row of {broken[0]} refers to a row of {broken[2]} that is missing")
+    for digest, data in file.execute("SELECT digest, data FROM proofs"):
+        if hashlib.sha256(data).hexdigest() != digest:
+            raise _damaged(path, f"the proof {digest} has changed")
+    return str(revision[0])
+
+
+def _damaged(path: Path, why: str) -> CirisError:
+    return CirisError("damaged_backup", f"{path} is not whole: {why}", field=_FIELD, hint="take another backup; nothing was changed")
+
+
+@contextmanager
+def _new_file(path: Path) -> Iterator[Path]:
+    """Yields where to write a file that only its user may read. After the block it is in its place and whole, or it is gone.
+
+    Raises:
+        CirisError: unwritable.
+    """
+    partial = path.with_name(f"{path.name}.partial")
+    try:
+        os.close(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600))
+        try:
+            yield partial
+            _to_disk(partial)
+            partial.replace(path)
+            _to_disk(path.parent)
+        finally:
+            for left in (partial, *(path.with_name(f"{partial.name}{end}") for end in ("-wal", "-shm", "-journal"))):
+                left.unlink(missing_ok=True)
+    except (OSError, sqlite3.Error) as error:
+        why = unreadable(error) if isinstance(error, OSError) else str(error)
+        problem = f"{path} cannot be written: {why}"
+        raise CirisError("unwritable", problem, field=_FIELD, hint="name a place that you may write to, with room") from None
+
+
+def _to_disk(path: Path) -> None:
+    file = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(file)
+    finally:
+        os.close(file)

@@ -1,0 +1,197 @@
+"""A backup has every row, and goes back into either database whole or not at all."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+from sqlalchemy import select, text
+
+from certifier.errors import CirisError
+from db import backup, jobs, migrate, proofs, version
+from db.models import EventRow, JobRow, ProofRow
+from db.session import Database
+from tests.db.builders import a_job, a_running_job, add_region
+from tests.services import Postgres
+
+PROOF = b"a proof \0 of all bytes: " + bytes(range(256))
+NEWEST = version.revisions()[-1]
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def other_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """The URL of another empty database."""
+    if request.param == "sqlite":
+        return f"sqlite:///{tmp_path / 'other' / 'ciris.sqlite3'}"
+    server: Postgres = request.getfixturevalue("postgres")
+    return server.new_database()
+
+
+@pytest.fixture
+def filled(database_url: str) -> str:
+    """A database with jobs, one of which retries a later one, a region, and a proof; the newest event has been deleted."""
+    database = Database(database_url)
+    with database.write() as session:
+        first, second = a_running_job(session, pair_count=3), a_job(session)
+        add_region(session, second)
+        jobs.keep_growth(session, first, {"next": 1, "ratio": 0.1 + 0.2})
+        first.retry_of = second.id
+        proofs.put(session, [PROOF])
+        session.add(EventRow(job_id=second.id, seq=998, kind="lost", data={}))
+        session.flush()
+        session.delete(session.scalars(select(EventRow).order_by(EventRow.id.desc()).limit(1)).one())
+    database.close()
+    return database_url
+
+
+def rows(path: Path) -> list[str]:
+    """Every row of a backup, as it is stored."""
+    with closing(sqlite3.connect(path)) as file:
+        return sorted(line for line in file.iterdump() if line.startswith("INSERT"))
+
+
+def last_event(url: str) -> int:
+    database = Database(url)
+    with database.write() as session:
+        event = EventRow(job_id=session.scalars(select(JobRow.id)).first(), seq=999, kind="later", data={})
+        session.add(event)
+        session.flush()
+        number = event.id
+        session.rollback()
+    database.close()
+    return number
+
+
+def test_every_row_comes_back_and_later_ids_stay_later(filled: str, other_url: str, tmp_path: Path) -> None:
+    first, again = tmp_path / "first", tmp_path / "again"
+    assert backup.backup(filled, first) == backup.restore(other_url, first) == NEWEST
+    assert migrate.drift(other_url) == []
+    backup.backup(other_url, again)
+    assert rows(first) == rows(again)
+    database = Database(other_url)
+    with database.read() as session:
+        assert proofs.get(session, proofs.digest(PROOF)) == PROOF
+        assert any(jobs.growth(session, job.id) == {"next": 1, "ratio": 0.1 + 0.2} for job in session.scalars(select(JobRow)))
+    database.close()
+    assert last_event(other_url) == last_event(filled), "an event that clients have seen has no namesake"
+
+
+def test_a_backup_of_before_an_upgrade_is_restored_and_upgraded(filled: str, other_url: str, tmp_path: Path) -> None:
+    oldest, file = version.revisions()[0], tmp_path / "old"
+    migrate.downgrade(filled, oldest)
+    assert backup.backup(filled, file) == oldest
+    assert backup.restore(other_url, file) == oldest
+    assert migrate.upgrade(other_url) == (oldest, NEWEST)
+    assert migrate.drift(other_url) == []
+    database = Database(other_url)
+    with database.read() as session:
+        assert session.get_one(ProofRow, proofs.digest(PROOF)).data == PROOF
+    database.close()
+
+
+def test_a_backup_is_for_its_user_alone_and_takes_no_other_files_place(filled: str, tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    backup.backup(filled, file)
+    assert file.stat().st_mode & 0o777 == 0o600
+    assert [path.name for path in tmp_path.iterdir() if path.name.startswith("file")] == ["file"]
+    before = file.read_bytes()
+    with pytest.raises(CirisError, match="already") as refused:
+        backup.backup(filled, file)
+    assert (refused.value.code, file.read_bytes()) == ("file_exists", before)
+
+
+def test_what_is_not_empty_is_not_replaced(filled: str, database_url: str, tmp_path: Path) -> None:
+    file, later = tmp_path / "file", tmp_path / "later"
+    backup.backup(filled, file)
+    with pytest.raises(CirisError, match="is not empty") as refused:
+        backup.restore(database_url, file)
+    assert refused.value.code == "not_empty"
+    backup.backup(database_url, later)
+    assert rows(file) == rows(later)
+
+
+def test_a_log_without_its_database_is_not_empty(sqlite_url: str, tmp_path: Path) -> None:
+    file, place = tmp_path / "file", tmp_path / "gone.sqlite3"
+    backup.backup(sqlite_url, file)
+    place.with_name("gone.sqlite3-wal").write_bytes(b"what was committed last")
+    with pytest.raises(CirisError, match="-wal is not empty"):
+        backup.restore(f"sqlite:///{place}", file)
+    assert not place.exists()
+
+
+def _change(statement: str, *values: object) -> Callable[[Path], None]:
+    def change(path: Path) -> None:
+        with closing(sqlite3.connect(path)) as file:
+            file.execute(statement, values)
+            file.commit()
+
+    return change
+
+
+def _cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+DAMAGES: dict[str, tuple[Callable[[Path], Any], str, str]] = {
+    "a proof that has changed": (_change("UPDATE proofs SET data = ?", b"another"), "damaged_backup", "the proof .* has changed"),
+    "a row that is missing": (_change("DELETE FROM scenes"), "damaged_backup", "refers to a row of scenes that is missing"),
+    "half a file": (_cut, "damaged_backup", "is not whole"),
+    "another file": (lambda path: path.write_bytes(b"no database at all" * 100), "damaged_backup", "is not whole"),
+    "no file": (lambda path: path.unlink(), "not_a_backup", "no such file"),
+    "an empty file": (lambda path: path.write_bytes(b""), "not_a_backup", "has no tables"),
+    "a later version": (_change("UPDATE alembic_version SET version_num = '9999'"), "database_version", "9999"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_file_that_is_not_whole_is_refused_and_leaves_the_database_empty(
+    sqlite_url: str, other_url: str, tmp_path: Path, damage: str
+) -> None:
+    database = Database(sqlite_url)
+    with database.write() as session:
+        add_region(session, a_job(session))
+        proofs.put(session, [PROOF])
+    database.close()
+    file, (act, code, said) = tmp_path / "file", DAMAGES[damage]
+    backup.backup(sqlite_url, file)
+    act(file)
+    with pytest.raises(CirisError, match=said) as refused:
+        backup.restore(other_url, file)
+    assert refused.value.code == code
+    assert migrate.upgrade(other_url)[0] is None, "it is as empty as before"
+
+
+def test_what_fails_half_way_leaves_an_empty_database(filled: str, postgres: Postgres, tmp_path: Path) -> None:
+    """A text that PostgreSQL cannot hold is among the last rows."""
+    file, url = tmp_path / "file", postgres.new_database()
+    backup.backup(filled, file)
+    _change("UPDATE jobs SET reason = 'zero ' || char(0) || ' byte'")(file)
+    with pytest.raises(Exception, match="NUL"):
+        backup.restore(url, file)
+    assert migrate.upgrade(url)[0] is None
+    migrate.downgrade(url, "base")
+    _change("UPDATE jobs SET reason = NULL")(file)
+    assert backup.restore(url, file) == NEWEST
+
+
+def test_a_backup_that_fails_leaves_no_file(filled: str, tmp_path: Path) -> None:
+    database = Database(filled)
+    with database.write() as session:
+        session.execute(text("UPDATE proofs SET data = :data WHERE digest = :digest"), {"data": b"x", "digest": proofs.digest(PROOF)})
+    database.close()
+    with pytest.raises(CirisError, match="has changed"):
+        backup.backup(filled, tmp_path / "file")
+    with pytest.raises(CirisError, match="cannot be written") as refused:
+        backup.backup(filled, tmp_path / "nowhere" / "file")
+    assert refused.value.code == "unwritable"
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith("file")]
+
+
+def test_a_database_without_tables_has_no_backup(empty_database_url: str, tmp_path: Path) -> None:
+    with pytest.raises(CirisError, match="has no tables"):
+        backup.backup(empty_database_url, tmp_path / "file")
+    assert not (tmp_path / "file").exists()
