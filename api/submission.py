@@ -20,7 +20,7 @@ from db.session import Database
 from db.settings import settings
 from jobs.registry import KINDS
 from jobs.request import JobRequest, WebhookRequest
-from workers.addresses import is_public
+from workers import addresses
 
 
 @dataclass(frozen=True)
@@ -122,10 +122,4 @@ def check_webhook(body: WebhookRequest) -> None:
         raise CirisError(
             "webhook_url", f"{body.url!r} cannot be called", field="webhook.url", hint="write https://host/path, without credentials"
         )
-    try:
-        private = not is_public(url.hostname or "")
-    except ValueError:
-        return  # the host is a name: the worker that calls it resolves it
-    if private and not settings().webhook_private:
-        hint = "CIRIS_WEBHOOK_PRIVATE=1 allows it"
-        raise CirisError("webhook_address", f"{url.hostname} is not a public address", field="webhook.url", hint=hint)
+    addresses.check(url.hostname or "", url.port or (443 if url.scheme == "https" else 80), settings().webhook_hosts)

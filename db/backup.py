@@ -160,7 +160,7 @@ def _last_ids(connection: Connection) -> dict[str, int]:
     """Returns the last id that each table which counts its rows has given, also to a row that is gone: clients may know it."""
     if connection.dialect.name == "sqlite":
         counted = [table for table in inspect(connection).get_table_names() if table != _VERSIONS]
-        last = dict(connection.exec_driver_sql("SELECT name, seq FROM sqlite_sequence").tuples().all())
+        last = {str(table): int(seq) for table, seq in connection.exec_driver_sql("SELECT name, seq FROM sqlite_sequence")}
         for table in counted:
             columns = {column["name"]: column["type"] for column in inspect(connection).get_columns(table)}
             if str(columns.get("id")) == "INTEGER":

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import socket
+from dataclasses import dataclass
 from functools import cache
 from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
 from typing import Annotated
+from urllib.parse import urlsplit
 
 from pydantic import BeforeValidator, Field
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
@@ -34,6 +36,28 @@ def _networks(given: object) -> object:
 
 
 Networks = Annotated[tuple[IPv4Network | IPv6Network, ...], NoDecode, BeforeValidator(_networks)]
+
+
+@dataclass(frozen=True)
+class Host:
+    """Names a host, in small letters, and one of its ports; None stands for the usual ones."""
+
+    name: str
+    port: int | None
+
+
+def _hosts(given: object) -> object:
+    """Takes hosts with commas between them apart, each with a port or without. An IPv6 address stands in brackets."""
+    if not isinstance(given, str):
+        return given
+    parts = [urlsplit(f"//{word.strip()}") for word in given.split(",") if word.strip()]
+    for part in parts:
+        if part.hostname is None or part.port == 0 or part.netloc.rpartition("@")[1] or part.path or part.query or part.fragment:
+            raise ValueError(f"{part.netloc or part.geturl()!r} is no host; write `name`, `name:8080`, `10.1.2.3` or `[fd00::1]:8080`")
+    return tuple(Host((part.hostname or "").rstrip("."), part.port) for part in parts)
+
+
+Hosts = Annotated[tuple[Host, ...], NoDecode, BeforeValidator(_hosts)]
 
 LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 
@@ -82,8 +106,9 @@ class Settings(BaseSettings):
     secret_key: str = Field(default="", repr=False)
     """Base64 of 32 bytes that the secrets of webhooks are encrypted with. Several with commas between: the first one encrypts. Empty: the
     service takes no webhooks. The embedded stack makes a key and keeps it in ``data_dir``."""
-    webhook_private: bool = False
-    """Webhooks may go to addresses that are not public, as in a private network."""
+    webhook_hosts: Hosts = ()
+    """Webhooks may go to these hosts although their addresses are private, written with commas between them. A port after a colon allows
+    that port; without one these are 443 and 80. Other hosts need public addresses, and one of these two ports."""
     time_limit_seconds: float = Field(default=3600.0, gt=0)
     """A batch of pairs or a step may take this many seconds; then its process is killed. A job with a pair that needs longer is refused."""
     child_memory_bytes: int = 16 << 30

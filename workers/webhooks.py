@@ -1,7 +1,8 @@
 """This module tells receivers that a job has ended, until they answer with success or the last attempt fails.
 
 It signs the messages as Standard Webhooks (standardwebhooks.com) describes, and runs beside the sweeper. A delivery may come twice,
-with the same ``webhook-id``. It goes only to public addresses unless the settings allow others, and follows no redirects.
+with the same ``webhook-id``. It goes only to public addresses, on ports 443 and 80, unless the settings list the host. It follows no
+redirects.
 """
 
 from __future__ import annotations
@@ -96,11 +97,29 @@ def _deliver(delivery: webhooks.Delivery) -> None:
         if not 200 <= status < 300:
             error = f"the receiver answered {status}"
     except (CirisError, OSError, HTTPException) as problem:
-        error = f"{type(problem).__name__}: {problem}"
+        error = _said(problem)
+        log.info("a receiver could not be called: %s: %s", type(problem).__name__, problem)
     with bound_contextvars(job=delivery.job.id, webhook=webhook.id), database().write() as session:
         if error:
             log.warning("attempt %d to deliver a webhook failed: %s", webhook.attempts, error)
         webhooks.settle(session, webhook.id, webhooks.Answered(at, time.monotonic() - began, status, answer, error))
+
+
+def _said(problem: Exception) -> str:
+    """Returns what people who may see the webhook learn of an error: nothing of names and addresses of the service's own network."""
+    match problem:
+        case CirisError():
+            return problem.message
+        case ssl.SSLCertVerificationError():
+            return "the receiver's certificate is not valid"
+        case ssl.SSLError():
+            return "the receiver does not speak TLS as it should"
+        case TimeoutError():
+            return f"the receiver has not answered within {SECONDS:.0f} s"
+        case HTTPException():
+            return "the receiver's answer is not HTTP"
+        case _:
+            return "no connection to the receiver, or it broke off"
 
 
 def _body(job: JobRow) -> bytes:
@@ -156,7 +175,7 @@ class _Pinned(HTTPConnection):
         super().__init__(url.hostname or "", url.port or (443 if self._tls else 80), timeout=SECONDS)
 
     def connect(self) -> None:
-        address = resolve(self.host, self.port, private=settings().webhook_private)
+        address = resolve(self.host, self.port, settings().webhook_hosts)
         self.sock = socket.create_connection((address, self.port), self.timeout)
         if self._abandoned:
             raise TimeoutError("timed out")

@@ -31,7 +31,7 @@ def machine(tmp_path: Path, postgres: Postgres, migrated_postgres: str) -> dict[
         CIRIS_HOST="0.0.0.0",
         CIRIS_SOLVE_PROCESSES="1",
         CIRIS_SWEEP_SECONDS="0.5",
-        CIRIS_WEBHOOK_PRIVATE="1",
+        CIRIS_WEBHOOK_HOSTS="127.0.0.1:9",
     )
 
 

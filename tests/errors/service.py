@@ -10,7 +10,7 @@ from api.access import KEYS_SECONDS
 from certifier.pair.forecast import forecast
 from db import keys, projects, proofs, scenes, staging, workers
 from db.keys import Scope
-from db.settings import Settings, settings
+from db.settings import Host, Settings, settings
 from db.states import WorkerState
 from db.workers import Made, WorkerKind
 from jobs import admission
@@ -187,8 +187,9 @@ SERVICE: Table = {
     ("webhook_url", "webhook.url"): [lambda t: hooked(t, "https://user:password@example.org/")],
     ("webhook_address", "webhook.url"): [
         lambda t: hooked(t, "http://127.0.0.1/"),
-        lambda t: resolve("nobody.invalid", 443, private=False),
-        lambda t: resolve("127.0.0.1", 443, private=False),
+        lambda t: hooked(t, "http://example.org:8080/"),
+        lambda t: resolve("nobody.invalid", 443, ()),
+        lambda t: resolve("nobody.invalid", 443, (Host("nobody.invalid", None),)),
     ],
     ("seed_wrong_length", "seed.q"): [lambda t: post(t, GROW | {"seed": {"q": [0.1, 0.2]}})],
     ("waypoint_outside_limits", "q[1]"): [outside],

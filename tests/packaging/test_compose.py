@@ -47,7 +47,7 @@ def test_the_settings_exist() -> None:
 
 def test_settings_of_an_operator_come_from_the_file_and_have_the_programs_defaults(monkeypatch: pytest.MonkeyPatch) -> None:
     given = SERVICES["api"]["environment"]
-    for name in ("CIRIS_TRUSTED_PROXIES", "CIRIS_WEBHOOK_PRIVATE", "CIRIS_REQUESTS_PER_SECOND"):
+    for name in ("CIRIS_TRUSTED_PROXIES", "CIRIS_WEBHOOK_HOSTS", "CIRIS_REQUESTS_PER_SECOND"):
         assert given[name] == SERVICES["control"]["environment"][name]
         default = re.fullmatch(rf"\$\{{{name}:?-(.*)\}}", given[name])
         assert default

@@ -6,6 +6,7 @@ import base64
 import hashlib
 import hmac
 import json
+import os
 import socket
 import threading
 import time
@@ -23,7 +24,7 @@ from certifier.errors import CirisError
 from db import jobs, projects, webhooks
 from db.models import DEFAULT_PROJECT, Base, WebhookRow
 from db.session import database
-from db.settings import settings
+from db.settings import Host, Settings, settings
 from db.states import JobState
 from db.types import utcnow
 from db.vault import vault
@@ -31,7 +32,7 @@ from tests.db.builders import a_job
 from tests.workers.service import environment, eventually
 from workers import addresses
 from workers import webhooks as delivering
-from workers.addresses import is_public, resolve
+from workers.addresses import check, is_public, may_be_called, resolve
 from workers.troubles import Troubles
 
 pytestmark = pytest.mark.lengthy
@@ -43,6 +44,7 @@ SECRET = "whsec_" + base64.b64encode(bytes(range(32))).decode()
 class Receiver:
     """An HTTP server that answers with ``answers`` in turn, the last of them for ever."""
 
+    host: str = ""
     url: str = ""
     answers: list[int] = field(default_factory=lambda: [204])
     headers: list[dict[str, str]] = field(default_factory=list)
@@ -69,7 +71,8 @@ def receiver() -> Iterator[Receiver]:
     server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
     thread = threading.Thread(target=server.serve_forever)
     thread.start()
-    received.url = f"http://127.0.0.1:{server.server_port}/hook?a=b"
+    received.host = f"127.0.0.1:{server.server_port}"
+    received.url = f"http://{received.host}/hook?a=b"
     yield received
     server.shutdown()
     thread.join()
@@ -77,10 +80,18 @@ def receiver() -> Iterator[Receiver]:
 
 
 @pytest.fixture
-def service(database_url: str) -> Iterator[None]:
-    """The settings of a service that may call receivers on this machine."""
-    with environment(CIRIS_DATABASE_URL=database_url, CIRIS_WEBHOOK_PRIVATE="1"):
+def service(database_url: str, receiver: Receiver) -> Iterator[None]:
+    """The settings of a service that may call the receiver, which is on this machine."""
+    with environment(CIRIS_DATABASE_URL=database_url, CIRIS_WEBHOOK_HOSTS=receiver.host):
         yield
+
+
+def also_allow(server: socket.socket, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Lists another receiver on this machine, and returns its URL."""
+    place = f"127.0.0.1:{server.getsockname()[1]}"
+    monkeypatch.setenv("CIRIS_WEBHOOK_HOSTS", f"{os.environ['CIRIS_WEBHOOK_HOSTS']}, {place}")
+    settings.cache_clear()
+    return f"http://{place}/"
 
 
 def a_webhook(url: str, *, ended: bool = True, project: str = DEFAULT_PROJECT) -> str:
@@ -207,15 +218,16 @@ def test_projects_take_turns_and_have_a_bound_as_each_of_their_receivers_has(ser
     assert claimed(*[("elsewhere", "http://any.example")] * webhooks.AT_ONCE) == []
 
 
-def test_receivers_that_do_not_answer_delay_nobody_else(service: None, receiver: Receiver) -> None:
+def test_receivers_that_do_not_answer_delay_nobody_else(service: None, receiver: Receiver, monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither another project nor another receiver of the same project."""
     with database().write() as session:
         projects.add(session, "others")
     stop = threading.Event()
     telling = threading.Thread(target=delivering.run, args=(stop, Troubles()))
     with socket.create_server(("127.0.0.1", 0), backlog=100) as silent:
+        url = also_allow(silent, monkeypatch)
         for _ in range(60):
-            a_webhook(f"http://127.0.0.1:{silent.getsockname()[1]}/")
+            a_webhook(url)
         telling.start()
         try:
             eventually(lambda: sum(row.attempts for row in every_row()) == webhooks.OF_RECEIVER, "the silent one is called")
@@ -267,13 +279,13 @@ def test_a_receiver_that_trickles_is_cut_off(service: None, monkeypatch: pytest.
 
         thread = threading.Thread(target=trickle)
         thread.start()
-        job_id = a_webhook(f"http://127.0.0.1:{server.getsockname()[1]}/")
+        job_id = a_webhook(also_allow(server, monkeypatch))
         start = time.monotonic()
         deliver_due()
         assert time.monotonic() - start < 30
         done.set()
         thread.join()
-    assert row_of(job_id).error
+    assert row_of(job_id).error in SAID
 
 
 def test_a_retry_tells_the_same_receiver(service: None, receiver: Receiver) -> None:
@@ -309,7 +321,7 @@ def test_a_secret_that_an_earlier_version_stored_is_encrypted_when_the_worker_st
 
 def test_without_the_key_a_receiver_is_not_told_and_the_attempt_says_why(service: None, receiver: Receiver) -> None:
     job_id = a_webhook(receiver.url)
-    with environment(CIRIS_DATABASE_URL=settings().database_url, CIRIS_WEBHOOK_PRIVATE="1", CIRIS_SECRET_KEY=""):
+    with environment(CIRIS_DATABASE_URL=settings().database_url, CIRIS_WEBHOOK_HOSTS=receiver.host, CIRIS_SECRET_KEY=""):
         deliver_due()
         assert receiver.bodies == []
         assert "no key fits" in (row_of(job_id).error or "")
@@ -338,24 +350,99 @@ def test_attempts_are_remembered_and_a_receiver_is_told_again_when_somebody_asks
         assert len(webhooks.deliveries(session, row.id)) == webhooks.KEPT
 
 
-def test_private_addresses_are_not_called(database_url: str, receiver: Receiver) -> None:
-    with environment(CIRIS_DATABASE_URL=database_url):
-        job_id = a_webhook(receiver.url.replace("127.0.0.1", "localhost"))
-        deliver_due()
-        assert receiver.bodies == []
-        assert "localhost is not a public address" in (row_of(job_id).error or "")
+@pytest.mark.parametrize("host", ["localhost", "127.0.0.1", "2130706433", "127.1", "nobody.invalid"])
+def test_private_addresses_are_not_called_and_nobody_learns_which_names_are_known(database_url: str, receiver: Receiver, host: str) -> None:
+    port = receiver.host.partition(":")[2]
+    with environment(CIRIS_DATABASE_URL=database_url, CIRIS_WEBHOOK_HOSTS=f"elsewhere:{port}"):
+        for url, error in (
+            (f"http://{host}/", f"{host} has no public address"),
+            (f"http://{host}:{port}/", f"port {port} of {host} may not be"),
+        ):
+            job_id = a_webhook(url)
+            deliver_due()
+            assert receiver.bodies == []
+            assert row_of(job_id).error == error
 
 
-PRIVATE = (
-    "127.0.0.1 0.0.0.0 10.1.2.3 172.16.0.1 192.168.1.1 169.254.169.254 100.64.0.1 224.0.0.1 255.255.255.255 ::1 :: fe80::1 fe80::1%eth0 "
-    "fc00::1 ff02::1 ::ffff:127.0.0.1 ::ffff:8.8.8.8 64:ff9b::7f00:1 2002:7f00:1:: 2001:0:53aa:64c:0:0:80ff:fffe"
+def test_the_address_is_looked_at_again_at_each_attempt(service: None, receiver: Receiver, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A name that led to a public address leads to this machine when the receiver is called (DNS rebinding)."""
+    port = int(receiver.host.partition(":")[2])
+    monkeypatch.setattr(addresses, "PORTS", (port,))
+    monkeypatch.setattr(addresses.socket, "getaddrinfo", lambda *_args, **_options: [(2, 1, 6, "", ("127.0.0.1", port))])
+    assert check("rebound.example", port, ()) is False
+    job_id = a_webhook(f"http://rebound.example:{port}/")
+    deliver_due()
+    assert (receiver.bodies, row_of(job_id).error) == ([], "rebound.example has no public address")
+
+
+SAID = {"no connection to the receiver, or it broke off", "the receiver has not answered within 1 s", "the receiver's answer is not HTTP"}
+
+
+@pytest.mark.parametrize(
+    ("answer", "scheme", "said"),
+    [
+        (None, "http", "no connection to the receiver, or it broke off"),
+        (b"SSH-2.0-OpenSSH_9.2 db-7.internal\r\n", "http", "the receiver's answer is not HTTP"),
+        (b"HTTP/1.1 400 10.1.2.3\r\n\r\n", "https", "the receiver does not speak TLS as it should"),
+    ],
 )
+def test_an_error_says_nothing_about_the_network(
+    service: None, monkeypatch: pytest.MonkeyPatch, answer: bytes | None, scheme: str, said: str
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        url = also_allow(server, monkeypatch).replace("http", scheme, 1)
+
+        def tell() -> None:
+            connection, _ = server.accept()
+            with connection:
+                connection.recv(65536)
+                connection.sendall(answer or b"")
+
+        thread = threading.Thread(target=tell)
+        if answer is None:
+            server.close()
+        else:
+            thread.start()
+        job_id = a_webhook(url)
+        deliver_due()
+        if answer is not None:
+            thread.join()
+    assert row_of(job_id).error == said
 
 
-def test_what_is_public() -> None:
-    assert [address for address in PRIVATE.split() if is_public(address)] == []
-    assert is_public("8.8.8.8")
-    assert is_public("2606:4700:4700::1111")
+PRIVATE = ["127.0.0.1", "10.1.2.3", "172.16.0.1", "192.168.1.1", "100.64.0.1", "::1", "fc00::1", "fd12:3456::1"]
+NEVER = [
+    address
+    for line in (
+        "0.0.0.0 169.254.169.254 169.254.170.2 168.63.129.16 100.100.100.200 192.0.0.192 192.88.99.1 198.18.0.1 224.0.0.1 240.0.0.1",
+        "255.255.255.255 :: ::8.8.8.8 ::7f00:1 fe80::1 fe80::1%eth0 fec0::1 fd00:ec2::254 fd20:ce::254 ff02::1 ff0e::1 100::1 3fff::1 5f00::1",
+        "::ffff:127.0.0.1 ::ffff:8.8.8.8 ::ffff:0:8.8.8.8 64:ff9b::7f00:1 64:ff9b::808:808 64:ff9b:1::808:808 2002:7f00:1:: 2002:808:808::",
+        "2001:0:53aa:64c:0:0:80ff:fffe 2001:20::1 2001:db8::1",
+    )
+    for address in line.split()
+]
+
+
+def test_what_is_public_and_what_can_be_allowed() -> None:
+    assert [address for address in PRIVATE + NEVER if is_public(address)] == []
+    assert [address for address in NEVER if may_be_called(address, listed=True)] == []
+    assert all(may_be_called(address, listed=True) and not may_be_called(address, listed=False) for address in PRIVATE)
+    for address in ("8.8.8.8", "2606:4700:4700::1111", "2a00:1450:4001:80b::200e"):
+        assert is_public(address)
+
+
+def test_the_list_names_hosts_with_their_ports() -> None:
+    hosts = Settings(webhook_hosts="Hooks.internal, 10.1.2.3:8080,[fd00::1]:99").webhook_hosts  # type: ignore[arg-type]
+    assert hosts == (Host("hooks.internal", None), Host("10.1.2.3", 8080), Host("fd00::1", 99))
+    for host, port in (("hooks.INTERNAL", 80), ("hooks.internal.", 443), ("10.1.2.3", 8080), ("fd00::1", 99)):
+        assert check(host, port, hosts)
+    for host, port in (("hooks.internal", 8080), ("10.1.2.3", 80), ("10.1.2.4", 443), ("other.internal", 99), ("fd00::1", 443)):
+        with pytest.raises(CirisError) as refused:
+            resolve(host, port, hosts)
+        assert refused.value.code == "webhook_address"
+    for wrong in ("http://a", "a/b", "a:0", "a:x", "user@a", ":80", "a?b"):
+        with pytest.raises(ValueError, match="webhook_hosts"):
+            Settings(webhook_hosts=wrong)  # type: ignore[arg-type]
 
 
 def test_one_private_address_among_public_ones_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -363,24 +450,28 @@ def test_one_private_address_among_public_ones_is_enough(monkeypatch: pytest.Mon
         entries = [(0, 0, 0, "", (address, 80)) for address in addresses_found]
         monkeypatch.setattr(addresses.socket, "getaddrinfo", lambda *_args, **_options: entries)
 
+    listed = (Host("example.org", None),)
     found("8.8.8.8")
-    assert resolve("example.org", 80, private=False) == "8.8.8.8"
+    assert resolve("example.org", 80, ()) == "8.8.8.8"
     found("8.8.8.8", "10.0.0.1")
-    with pytest.raises(CirisError, match="not a public address"):
-        resolve("example.org", 80, private=False)
-    assert resolve("example.org", 80, private=True) == "8.8.8.8"
+    with pytest.raises(CirisError, match="no public address"):
+        resolve("example.org", 80, ())
+    assert resolve("example.org", 80, listed) == "8.8.8.8"
+    found("10.0.0.1", "169.254.169.254")
+    with pytest.raises(CirisError, match="no address that may be called"):
+        resolve("example.org", 80, listed)
 
 
 def test_names_that_do_not_resolve_are_an_error_of_the_receiver() -> None:
     for host in ("nowhere.invalid", "a" * 300, "\udcff"):
-        with pytest.raises(CirisError, match="no address of"):
-            resolve(host, 80, private=False)
+        with pytest.raises(CirisError, match="no public address"):
+            resolve(host, 80, ())
 
 
 def test_the_running_service_delivers(receiver: Receiver, sqlite_url: str, queue: object, tmp_path: Path) -> None:
     from tests.workers.service import running_service
 
-    with running_service(sqlite_url, queue.url, tmp_path, CIRIS_WEBHOOK_PRIVATE="1"):  # type: ignore[attr-defined]
+    with running_service(sqlite_url, queue.url, tmp_path, CIRIS_WEBHOOK_HOSTS=receiver.host):  # type: ignore[attr-defined]
         job_id = a_webhook(receiver.url)
         eventually(lambda: row_of(job_id).state == "delivered", "the webhook is delivered")
     assert len(receiver.bodies) == 1
