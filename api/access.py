@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import math
 import time
+from collections.abc import Awaitable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Annotated
 
 from fastapi import Depends, Request, Security
 from fastapi.security import HTTPBearer
+from sqlalchemy.exc import TimeoutError as DatabaseTimeoutError
 from starlette.datastructures import Headers
 from starlette.requests import cookie_parser
 
@@ -18,11 +20,13 @@ from certifier.errors import CirisError
 from db import keys, version
 from db.keys import Ring, Scope
 from db.models import DEFAULT_PROJECT
-from db.session import Database
+from db.session import UNAVAILABLE, Database
 
 COOKIE = "ciris_key"
 KEYS_SECONDS = 1.0
 """The keys that were read from the database are trusted for this many seconds."""
+PATIENCE_SECONDS = 0.3
+"""A request of monitoring waits this many seconds for the keys."""
 AGAIN_SECONDS = 0.1
 """When requests bring unknown keys, the database is read at most once in this many seconds, however many requests there are."""
 _thread = ThreadPoolExecutor(1, "keys")
@@ -57,9 +61,17 @@ class Keyring:
         self._read_at = -math.inf
         self._reading: asyncio.Future[None] | None = None
 
-    async def caller(self, given: str | None) -> Caller | None:
-        """Returns the caller to whom the key of a request belongs; None when the keys known now do not let this caller in."""
-        ring = await self._as_of(time.monotonic() - KEYS_SECONDS)
+    async def caller(self, given: str | None, *, patient: bool = True) -> Caller | None:
+        """Returns the caller to whom the key of a request belongs; None when the keys known now do not let this caller in.
+
+        Args:
+            patient: False for a request that must be answered while the database hangs: the keys that were read last count then.
+
+        Raises:
+            sqlalchemy.exc.SQLAlchemyError: the keys cannot be read.
+        """
+        fresh = self._as_of(time.monotonic() - KEYS_SECONDS)
+        ring = await (fresh if patient else self._soon(fresh))
         if self._read_at < time.monotonic() - KEYS_SECONDS / 2:
             self._read_soon()
         if given is not None:
@@ -82,6 +94,15 @@ class Keyring:
         while self._read_at < moment:
             await asyncio.shield(self._read_soon(pause))
         return self._ring
+
+    async def _soon(self, reading: Awaitable[Ring]) -> Ring:
+        """Returns the ring of the reading or, where it takes too long or fails, the last one that was read."""
+        try:
+            return await asyncio.wait_for(reading, PATIENCE_SECONDS)
+        except (TimeoutError, *UNAVAILABLE):
+            if self._read_at == -math.inf:
+                raise DatabaseTimeoutError("the keys could not be read in time") from None
+            return self._ring
 
     def _read_soon(self, pause: float = 0.0) -> asyncio.Future[None]:
         """Returns the reading that is under way, and starts one if there is none."""

@@ -24,6 +24,7 @@ from api.metrics import Requests
 from api.motions import MotionsKept
 from api.pages import site
 from api.pages.rendering import render_problem
+from api.probes import Probes
 from api.questions import LARGE, SMALL
 from api.reading import READERS
 from api.room import Room
@@ -77,6 +78,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     )
     app.state.database = db or database()
     app.state.requests = Requests(settings().requests_file)
+    app.state.probes = Probes(app.state.database)
     app.state.children = ChildLimiter()
     app.state.libraries = Libraries()
     app.state.links = LinksKept()

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping
 from itertools import accumulate
 from pathlib import Path
 
+from api.probes import OK
 from db.statistics import Statistics
 
 log = logging.getLogger(__name__)
@@ -116,14 +117,39 @@ def _mapped(file: Path) -> mmap.mmap | None:
         return None
 
 
-def render(statistics: Statistics, waiting: Mapping[str, int], requests: Requests) -> str:
+def render(
+    counted: tuple[float, Statistics] | None,
+    waiting: Mapping[str, int],
+    requests: Requests,
+    checks: Mapping[str, str],
+    connections: Mapping[tuple[str, str], int],
+) -> str:
     """Returns all metrics as text.
 
     Args:
+        counted: the rows of the database, and how many seconds ago they were counted; None where the database does not answer.
         waiting: messages in each queue; empty when Redis cannot be reached.
+        checks: what each check says; ``ok`` where all is well.
+        connections: connections to the database, by pool and use.
     """
     answered = requests.totals()
+    passed = {check: int(said == OK) for check, said in checks.items()}
+    pools = {(("pool", pool), ("use", use)): count for (pool, use), count in connections.items()}
     families = [
+        _family("ciris_check", "gauge", "1 where a check of /readyz says ok, else 0.", _by("check", passed)),
+        _family("ciris_database_connections", "gauge", "Connections of this process, by pool and use.", pools),
+        _family("ciris_queue_messages", "gauge", "Messages that wait, by queue.", _by("queue", waiting)),
+        _family("ciris_http_requests_total", "counter", "Requests answered.", _requests(answered, 0)),
+        _family("ciris_http_request_seconds_total", "counter", "Time that they took.", _requests(answered, 1)),
+        _histogram("ciris_http_latency_seconds", "Time until a request was answered, without streams.", requests.latencies()),
+        *([] if counted is None else _of_rows(*counted)),
+    ]
+    return "".join(families)
+
+
+def _of_rows(age: float, statistics: Statistics) -> list[str]:
+    return [
+        _family("ciris_statistics_age_seconds", "gauge", "Time since the rows of the database were counted.", {(): age}),
         _family("ciris_jobs", "gauge", "Jobs by state.", _by("state", statistics.jobs)),
         _family("ciris_pairs", "gauge", "Pairs by state; the settled ones by outcome.", _by("state", statistics.pairs)),
         _family("ciris_pair_seconds", "gauge", "Time spent on the stored pairs, by state.", _by("state", statistics.pair_seconds)),
@@ -134,14 +160,9 @@ def render(statistics: Statistics, waiting: Mapping[str, int], requests: Request
         _family("ciris_workers_in_trouble", "gauge", "Workers of whose regular tasks one fails.", {(): statistics.workers_in_trouble}),
         _family("ciris_workers_wanted", "gauge", "Solving processes that would be busy now.", {(): statistics.workers_wanted}),
         _family("ciris_decisions_due", "gauge", "Jobs that wait for a control worker.", {(): statistics.decisions_due}),
-        _family("ciris_queue_messages", "gauge", "Messages that wait, by queue.", _by("queue", waiting)),
-        _family("ciris_http_requests_total", "counter", "Requests answered.", _requests(answered, 0)),
-        _family("ciris_http_request_seconds_total", "counter", "Time that they took.", _requests(answered, 1)),
-        _histogram("ciris_http_latency_seconds", "Time until a request was answered, without streams.", requests.latencies()),
         _family("ciris_open_pieces", "gauge", "Pieces that wait, of iterations begun longer ago than.", _ages(statistics)),
         _family("ciris_oldest_open_piece_seconds", "gauge", "Age of what waits longest.", {(): max(statistics.waiting, default=0.0)}),
     ]
-    return "".join(families)
 
 
 def _ages(statistics: Statistics) -> Samples:

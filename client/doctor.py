@@ -82,6 +82,7 @@ def _service(url: str | None) -> Finding:
         with Client(service_url(url), api_key()) as client:
             ready = client.ready()
             wrong = "; ".join(f"{name}: {state}" for name, state in ready["checks"].items() if state != "ok")
-            return Finding("service", f"{client.url} is {'ready' if ready['ready'] else f'not ready ({wrong})'}", ready["ready"])
+            how = "is not ready" if not ready["ready"] else "is ready, but jobs wait" if wrong else "is ready"
+            return Finding("service", f"{client.url} {how}{f' ({wrong})' if wrong else ''}", not wrong)
     except CirisError as error:
         return Finding("service", str(error), good=error.code == "no_service" and url is None)

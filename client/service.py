@@ -143,10 +143,9 @@ def certify(client: Client, scene: Document, given: PolytopeFile, asked: Documen
 
 def _wait(client: Client, job_id: str, screen: Screen, watch: bool) -> Document:
     try:
-        ready = client.ready()
-        if not ready["ready"]:
-            wrong = "; ".join(f"{name}: {state}" for name, state in ready["checks"].items() if state != "ok")
-            screen.line(f"warning: the job waits until the service is ready ({wrong})")
+        wrong = "; ".join(f"{name}: {said}" for name, said in client.ready()["checks"].items() if said != "ok")
+        if wrong:
+            screen.line(f"warning: the job waits until the service has all that it needs ({wrong})")
         return follow(client, job_id, screen, watch)
     except (KeyboardInterrupt, CirisError):
         screen.line(f"job {job_id} goes on while the service runs: {client.url}/jobs/{job_id}")

@@ -170,6 +170,18 @@ class Database:
         except FileNotFoundError:
             return 0
 
+    def connections(self) -> dict[tuple[str, str], int]:
+        """Returns how many connections of this process each pool has: (pool, ``used``, ``idle`` or ``most``) -> number.
+
+        SQLite has a pool for reading and one for writing, PostgreSQL one for both.
+        """
+        pools = {"read": self.reader.pool, "write": self.writer.pool} if self.sqlite else {"both": self.writer.pool}
+        counts = {}
+        for name, pool in pools.items():
+            assert isinstance(pool, QueuePool)
+            counts |= {(name, "used"): pool.checkedout(), (name, "idle"): pool.checkedin(), (name, "most"): pool.size()}
+        return counts
+
     def close(self) -> None:
         self.reader.dispose()
         self.writer.dispose()

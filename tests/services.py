@@ -10,7 +10,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from pathlib import Path
 from uuid import uuid4
@@ -55,9 +55,26 @@ class Queue:
         if losing_everything:
             shutil.rmtree(self._directory / "data")
 
+    def hangs(self) -> AbstractContextManager[None]:
+        """It answers nothing while the block runs."""
+        assert self._process is not None
+        return stopped([self._process.pid])
+
     def flush(self) -> None:
         """Loses every message."""
         redis.Redis(unix_socket_path=str(self.socket)).flushall()
+
+
+@contextmanager
+def stopped(pids: Sequence[int]) -> Iterator[None]:
+    """These processes do nothing while the block runs, and keep their connections."""
+    for pid in pids:
+        os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        for pid in pids:
+            os.kill(pid, signal.SIGCONT)
 
 
 @contextmanager
@@ -74,11 +91,18 @@ def queue_server() -> Iterator[Queue]:
 class Postgres:
     """A PostgreSQL server; :meth:`new_database` makes an empty database in it."""
 
-    def __init__(self, port: int) -> None:
-        self.port = port
+    def __init__(self, port: int, pid: int) -> None:
+        self.port, self._pid = port, pid
 
     def connect(self) -> psycopg.Connection:
         return psycopg.connect(host="127.0.0.1", port=self.port, user="postgres", dbname="postgres", autocommit=True)
+
+    def hangs(self) -> AbstractContextManager[None]:
+        """It answers nothing while the block runs, neither on new connections nor on those that there are."""
+        with self.connect() as connection:
+            found = connection.execute("SELECT pid FROM pg_stat_activity WHERE backend_type = 'client backend' AND pid <> pg_backend_pid()")
+            backends = [pid for (pid,) in found]
+        return stopped([self._pid, *backends])
 
     def new_database(self, template: str = "template0") -> str:
         """The SQLAlchemy URL of a new database: empty, or a copy of another one."""
@@ -110,7 +134,7 @@ def postgres_server(port: int | None = None, reachable: Sequence[str] = ()) -> I
         preexec = partial(die_with_parent, signal.SIGINT)
         with (Path(directory) / "log").open("wb") as log:
             process = subprocess.Popen(serve, stdout=log, stderr=log, user=user, cwd=directory, preexec_fn=preexec)
-        server = Postgres(port)
+        server = Postgres(port, process.pid)
         try:
             _wait(lambda: server.connect().close(), psycopg.OperationalError, process)
             yield server

@@ -1,22 +1,29 @@
-"""These routes say whether the service runs and can do its work."""
+"""These routes say whether the service runs and can do its work. Whatever hangs, they answer within a second."""
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response, status
-from kombu.exceptions import OperationalError
-from redis.exceptions import RedisError
-from sqlalchemy.exc import SQLAlchemyError
+import asyncio
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Request, Response, status
 
 from api import metrics
 from api.access import READ, WholeDb
+from api.probes import OK, Probes
 from api.schemas.service import Health, Readiness
-from certifier.errors import CirisError
-from db import version
-from db.session import Database
-from db.statistics import collect
-from workers.app import CONTROL, SOLVE, waiting
+
+OTHERS = frozenset({"queue"})
+"""An API process can serve requests without what these checks are about."""
 
 router = APIRouter(tags=["service"])
+
+
+async def _probes(request: Request) -> Probes:
+    probes: Probes = request.app.state.probes
+    return probes
+
+
+Asked = Annotated[Probes, Depends(_probes)]
 
 
 @router.get("/healthz")
@@ -25,17 +32,15 @@ async def get_health() -> Health:
     return Health()
 
 
-@router.get("/readyz", responses={503: {"model": Readiness, "description": "The service cannot reach something that it needs."}})
-def get_readiness(db: WholeDb, response: Response) -> Readiness:
-    """Says whether the service can reach the database and the queue, and whether the database's disk has room (SQLite).
+@router.get("/readyz", responses={503: {"model": Readiness, "description": "This process cannot serve requests."}})
+async def get_readiness(probes: Asked, response: Response) -> Readiness:
+    """Says whether this process can serve requests: whether the database answers and, with SQLite, whether its disk has room.
 
-    Without the queue the service still accepts jobs, but they wait. Without room it accepts none, begins nothing new, and goes on by
-    itself when there is some.
+    The check of the queue does not count. Without the queue the service accepts jobs, and they wait. Without room on the disk it accepts
+    none, begins nothing new, and goes on by itself when there is some. What hangs is named within a second.
     """
-    checks = {"database": _database(db), "queue": _queue()}
-    if db.sqlite:
-        checks["disk"] = db.disk.trouble() or "ok"
-    ready = set(checks.values()) == {"ok"}
+    checks = await probes.checks()
+    ready = all(said == OK for check, said in checks.items() if check not in OTHERS)
     if not ready:
         response.status_code = status.HTTP_503_SERVICE_UNAVAILABLE
     return Readiness(ready=ready, checks=checks)
@@ -44,31 +49,11 @@ def get_readiness(db: WholeDb, response: Response) -> Readiness:
 @router.get(
     "/metrics", dependencies=[READ], response_class=Response, responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}}
 )
-def get_metrics(request: Request, db: WholeDb) -> Response:
-    """Returns the numbers of jobs, pairs, waiting messages and requests of all projects, in Prometheus' text format."""
-    try:
-        messages = {queue: waiting(queue) for queue in (CONTROL, SOLVE)}
-    except (OperationalError, RedisError):
-        messages = {}
-    with db.read() as session:
-        statistics = collect(session)
-    return Response(metrics.render(statistics, messages, request.app.state.requests), media_type=metrics.MEDIA_TYPE)
+async def get_metrics(request: Request, db: WholeDb, probes: Asked) -> Response:
+    """Returns the numbers of jobs, pairs, waiting messages and requests of all projects, in Prometheus' text format.
 
-
-def _database(db: Database) -> str:
-    try:
-        with db.read() as session:
-            version.check(session)
-    except CirisError as error:
-        return error.message
-    except SQLAlchemyError as error:
-        return f"cannot be used: {type(error).__name__}"
-    return "ok"
-
-
-def _queue() -> str:
-    try:
-        waiting(CONTROL)
-    except (OperationalError, RedisError) as error:
-        return f"Redis cannot be reached: {error}"
-    return "ok"
+    What hangs is left out, and `ciris_check` says that it hangs.
+    """
+    checks, messages, statistics = await asyncio.gather(probes.checks(), probes.messages(), probes.statistics())
+    text = metrics.render(statistics, messages, request.app.state.requests, checks, db.connections())
+    return Response(text, media_type=metrics.MEDIA_TYPE)

@@ -22,9 +22,9 @@ class Health(BaseModel):
 
 
 class Readiness(BaseModel):
-    """Says whether the service can do its work. A check is `ok` or says what is wrong."""
+    """Says whether this process can serve requests. A check is `ok` or says what is wrong."""
 
-    ready: bool = Field(description="True where every check is `ok`.")
+    ready: bool = Field(description="True where every check but `queue` is `ok`. Without the queue, jobs are accepted and wait.")
     checks: dict[str, str] = Field(description="Name of a check -> `ok`, or what is wrong and what to do.")
 
 

@@ -62,7 +62,7 @@ def test_both_databases_count_alike(db: Database) -> None:
     with db.read() as session:
         statistics = collect(session)
     assert set(statistics.jobs.values()) == {0}
-    assert samples(render(statistics, {}, Requests()))['ciris_step_seconds{kind="accept"}'] == 0
+    assert samples(render((0.0, statistics), {}, Requests(), {}, {}))['ciris_step_seconds{kind="accept"}'] == 0
 
 
 def test_processes_on_one_port_count_together_and_go_on_when_they_are_started_again(tmp_path: Path) -> None:
@@ -131,6 +131,6 @@ def test_the_age_of_what_waits_is_told(db: Database) -> None:
         session.get_one(IterationRow, (job.id, 0)).started_at = utcnow() - timedelta(seconds=90)
         a_running_job(session, pair_count=2)
     with db.read() as session:
-        found = samples(render(collect(session), {}, Requests()))
+        found = samples(render((0.0, collect(session)), {}, Requests(), {}, {}))
     assert [found[f'ciris_open_pieces{{seconds="{age}"}}'] for age in (0, 60, 600)] == [5, 3, 0]
     assert 90 <= found["ciris_oldest_open_piece_seconds"] < 120
