@@ -103,7 +103,7 @@ def waiting(queue: str) -> int:
     """
     app = celery_app()
     try:
-        with app.connection_for_read() as connection, connection.channel() as channel:
+        with app.connection_for_read() as connection, connection.ensure_connection(**SENDING).channel() as channel:
             return int(app.amqp.queues[queue](channel).queue_declare(passive=False).message_count)
     except RedisError as error:
         raise OperationalError(str(error)) from error

@@ -441,7 +441,7 @@ def test_a_queue_that_is_down_is_one_warning(url: str, scene: Scene, environment
     said = [waiting.stderr.readline() for _ in range(2)]
     waiting.kill()
     waiting.communicate()
-    assert said[1].startswith("warning: the job waits until the service is ready (queue: Redis cannot be reached")
+    assert said[1].startswith("warning: the job waits until the service has all that it needs (queue: Redis cannot be reached")
 
 
 def test_doctor_lists_what_is_there(ciris: Ciris) -> None:
