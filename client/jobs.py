@@ -32,7 +32,7 @@ def job_ls(args: Namespace) -> int:
         (
             job["id"][:SHORT],
             job["kind"],
-            job["state"],
+            job["status"],
             names.get(job["scene"]) or job["scene"],
             job["created_at"][:19],
             job["region"][:SHORT] if job["region"] else "",
@@ -40,7 +40,7 @@ def job_ls(args: Namespace) -> int:
         )
         for job in jobs
     ]
-    output.print_table(("id", "kind", "state", "scene", "created", "region", "reason"), rows)
+    output.print_table(("id", "kind", "status", "scene", "created", "region", "reason"), rows)
     return OK
 
 
@@ -132,7 +132,7 @@ def _print(job: dict[str, Any]) -> None:
     facts = [
         ("job", job["id"]),
         ("kind", job["kind"]),
-        ("state", job["state"]),
+        ("status", job["status"]),
         ("scene", job["scene"]),
         ("created", job["created_at"][:19]),
         *([("labels", ", ".join(f"{name}={value}" for name, value in job["labels"].items()))] if job["labels"] else []),

@@ -325,6 +325,12 @@ def coordinated_by(session: Session, processes: Collection[str]) -> Sequence[Job
     return session.scalars(select(JobRow).where(*mine).order_by(JobRow.created_at, JobRow.id)).all()
 
 
+def undecided(session: Session, limit: int) -> Sequence[str]:
+    """Returns the ids of at most this many jobs that nobody has decided about, in the order in which they were made."""
+    query = select(JobRow.id).where(JobRow.state == JobState.QUEUED).order_by(JobRow.created_at, JobRow.id)
+    return session.scalars(query.limit(limit)).all()
+
+
 def awaiting_coordination(session: Session, now: datetime) -> list[str]:
     """Returns the ids of the unfinished jobs for which a coordination is due and that nobody coordinates.
 

@@ -85,6 +85,17 @@ def project_of(session: Session) -> str | None:
     return project
 
 
+@contextmanager
+def all_projects(session: Session) -> Iterator[None]:
+    """Lets a project's session find the rows of all projects while the block runs: to count them, and to show nothing else of them."""
+    project = session.info.pop(_PROJECT, None)
+    try:
+        yield
+    finally:
+        if project is not None:
+            session.info[_PROJECT] = project
+
+
 class Database:
     """Holds one database: its engines for reading and for writing, and the two kinds of transaction.
 

@@ -12,6 +12,7 @@ The queries are built once, with the time and the job as parameters, because bui
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cache
 
 from sqlalchemy import ColumnElement, Select, and_, bindparam, case, exists, func, or_, select
@@ -28,7 +29,12 @@ ROUNDING = 1e-9
 
 def next_job(session: Session) -> str | None:
     """Returns the id of the job whose work is done next; None when there is no work."""
-    return session.scalar(_next_job(), {"now": utcnow()})
+    return next(iter(in_order(session, 1)), None)
+
+
+def in_order(session: Session, limit: int) -> Sequence[str]:
+    """Returns the ids of at most this many jobs with work that nobody does, in the order in which they get a worker."""
+    return session.scalars(_in_order(), {"now": utcnow(), "limit": limit}).all()
 
 
 def claim(session: Session, job_id: str, *, lease_seconds: float, batch_seconds: float) -> pairs.Claim | steps.Claim | None:
@@ -80,8 +86,8 @@ _NOW = bindparam("now", type_=Utc())
 
 
 @cache
-def _next_job() -> Select[str]:
-    return select(JobRow.id).where(_has_work()).order_by(JobRow.served, JobRow.created_at, JobRow.id).limit(1)
+def _in_order() -> Select[str]:
+    return select(JobRow.id).where(_has_work()).order_by(JobRow.served, JobRow.created_at, JobRow.id).limit(bindparam("limit"))
 
 
 @cache

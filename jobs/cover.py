@@ -19,7 +19,7 @@ from certifier.growth.options import GrowthOptions
 from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.seeding.options import IRIS_SEEDS, SeedOptions
-from db import clock, events, jobs, regions, steps
+from db import activity, clock, events, jobs, regions, steps
 from db.models import JobRow
 from db.session import Database
 from db.states import JOB, unfinished
@@ -153,12 +153,21 @@ class Cover(Kind):
         """Returns what the last look of a cover has seen, as :func:`planner.cover.result.said` says it, with its ``regions`` and jobs."""
         seen = dict.fromkeys(("coverage", "components", "largest", "connected", "connect", "seeds", "paths", "missing", "obstacles"))
         known = self._said(session, job)
+        grown = jobs.children(session, job.id)
+        does = activity.of_jobs(session, grown)
         return {
             **{name: known.get(name) for name in seen},
             "regions": [region.id for region in regions.of_cover(session, job.id)],
             "grown": [
-                {"job": one.id, "number": one.number or 0, "state": one.state, "region": one.region_id, "reason": one.reason}
-                for one in jobs.children(session, job.id)
+                {
+                    "job": one.id,
+                    "number": one.number or 0,
+                    "state": one.state,
+                    "status": does[one.id],
+                    "region": one.region_id,
+                    "reason": one.reason,
+                }
+                for one in grown
             ],
         }
 

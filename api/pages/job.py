@@ -83,7 +83,7 @@ class Progress:
 
     Attributes:
         parts: (state, number of pairs), certified first.
-        settled: number of pairs that have their outcome or were reused.
+        settled: number of pairs that have their outcome or were reused, those of a group each.
         open_cells: what the searches over partitions have left open, in words; None where they left nothing.
     """
 
@@ -98,9 +98,9 @@ def progress(matrix: PairMatrix) -> Progress:
     """Returns the progress of the matrix's last iteration."""
     last = matrix.iterations[-1]
     cells = [cell for cell in matrix.cells if cell.iteration == last.index]
-    counts, left = Counter(cell.state.value for cell in cells), sum(cell.open_cells or 0 for cell in cells)
-    if last.reused:
-        counts["reused"] = len(last.reused)
+    counts, left = Counter[str](), sum(cell.open_cells or 0 for cell in cells)
+    for state, pair in [*((cell.state.value, cell.pair) for cell in cells), *(("reused", pair) for pair in last.reused)]:
+        counts[state] += 1 + len(last.together.get(pair, ()))
     parts = [(state, counts[state]) for state in _ORDER if counts[state]]
     unsettled = counts["open"] + counts["running"] + counts["skipped"]
     return Progress(last, parts, counts.total() - unsettled, counts.total(), _open_cells(left) if left else None)

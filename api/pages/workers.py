@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
@@ -12,6 +13,7 @@ from api.routers import workers
 from api.schemas.common import Cursor
 from db.keys import Scope
 from db.models import DEFAULT_PROJECT
+from db.states import WorkerState
 
 router = APIRouter()
 
@@ -29,4 +31,7 @@ def workers_live(request: Request, caller: Reader, db: Db, after: Cursor = None)
 def _crew(caller: Reader, db: Db, after: str | None) -> dict[str, Any]:
     found = workers.list_workers(db, after)
     may_ask = caller.scope.includes(Scope.ADMIN) and caller.project == DEFAULT_PROJECT
-    return {"workers": found.workers, "next": found.next, "after": after, "may_ask": may_ask}
+    takes_work = [one for one in found.workers if one.wanted == WorkerState.RUNNING]
+    kinds = Counter(one.kind for one in takes_work)
+    last = {one.id for one in takes_work if kinds[one.kind] == 1}
+    return {"workers": found.workers, "missing": found.missing, "last": last, "next": found.next, "after": after, "may_ask": may_ask}

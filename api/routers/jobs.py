@@ -45,7 +45,7 @@ from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Stage
 from certifier.proof.container import with_scene
-from db import audit, clock, jobs, labels, leases, pages, pairs, proofs, regions, retention, scenes
+from db import activity, audit, clock, jobs, labels, leases, pages, pairs, progress, proofs, regions, retention, scenes
 from db.audit import Action
 from db.models import IterationRow, JobRow, PairRow, StepRow
 from db.session import Database
@@ -152,11 +152,12 @@ def cancel_jobs(body: CancelRequest, db: Db, background: BackgroundTasks, announ
 
 
 def _described(db: Database, rows: Sequence[JobRow]) -> list[Job]:
-    """Describes jobs with their labels and the shares of their last regions."""
+    """Describes jobs: with what they do now, how far they are, their labels and the shares of their last regions."""
     with db.read() as session:
+        does, settled = activity.of_jobs(session, rows), progress.of_jobs(session, rows)
         shares = regions.shares(session, [row.region_id for row in rows if row.region_id is not None])
         known = labels.of_jobs(session, [row.id for row in rows])
-    return [Job.of(row, shares.get(row.region_id or ""), known.get(row.id, {})) for row in rows]
+    return [Job.of(row, does[row.id], settled.get(row.id), shares.get(row.region_id or ""), known.get(row.id, {})) for row in rows]
 
 
 @router.get("")

@@ -17,11 +17,12 @@ from api.schemas.common import Cursor, Listed, WorkerGiven
 from api.schemas.workers import Worker, WorkerPage
 from api.writing import writing
 from certifier.errors import CirisError
-from db import audit, clock, jobs, leases, workers
+from db import activity, audit, clock, jobs, leases, workers
 from db.audit import Action
 from db.models import DEFAULT_PROJECT, PairRow, StepRow, WorkerRow
 from db.session import Database
 from db.states import WorkerState
+from db.workers import WorkerKind
 
 router = APIRouter(prefix="/v1/workers", tags=["workers"], dependencies=[READ], route_class=ReadingRoute)
 
@@ -30,8 +31,9 @@ router = APIRouter(prefix="/v1/workers", tags=["workers"], dependencies=[READ], 
 def list_workers(db: Db, after: Cursor = None, limit: Listed = 100) -> WorkerPage:
     """Lists the workers that live, with what they do at this moment, those that began last first."""
     with db.read() as session:
-        page = workers.page(session, after, limit)
-    return WorkerPage(workers=_described(db, page.rows), next=page.next)
+        page, counts = workers.page(session, after, limit), workers.counts(session)
+    missing = [said for kind in WorkerKind if (said := activity.missing(counts, kind)) is not None]
+    return WorkerPage(workers=_described(db, page.rows), missing=list(dict.fromkeys(missing)), next=page.next)
 
 
 @router.get("/{worker_id}")

@@ -22,6 +22,7 @@ class CoverRegion(BaseModel):
     job: str = Field(description="Id of the job that grows it.")
     number: int = Field(description="Number of the region among those that the cover has begun.")
     state: JobState = Field(description="State of the job that grows it.")
+    status: str = Field(description="What that job does now, in the words of its `status`.", examples=["working"])
     region: str | None = Field(description="Id of the last certified region of that job.")
     reason: str | None = Field(description="A sentence that says why growing ended.")
 

@@ -40,7 +40,13 @@ class Job(BaseModel):
     id: str = Field(description="Id of the job.")
     kind: JobKind = Field(description="What the job does.")
     scene: str = Field(description="Id of the scene.")
-    state: JobState = Field(description="Where the job is.")
+    state: JobState = Field(description="Where the job is. It is `running` from the first decision on, also while nobody works on it.")
+    status: str = Field(
+        description="What the job does now, in words for people. `working`: somebody works on it. `queued: ` goes on with why nobody does: "
+        "`no worker`, `no control worker`, `all workers paused`, `behind 3 others` or `next`. `stalled: ` goes on with what gives no sign "
+        "of life. Else it is the state.",
+        examples=["queued: no worker"],
+    )
     outcome: Outcome | None = Field(description="Outcome for the polytope or the motion asked for; null before the job ends.")
     reason: str | None = Field(description="A sentence that says why the job ended.")
     error: Document | None = Field(description="What was wrong (code, message, field, hint) when the job failed.")
@@ -60,10 +66,12 @@ class Job(BaseModel):
     progress: Progress = Field(description="How far the job is in its last iteration, and how large its last region is.")
 
     @classmethod
-    def of(cls, row: JobRow, share: float | None, labels: dict[str, str]) -> Self:
+    def of(cls, row: JobRow, status: str, settled: tuple[int, int] | None, share: float | None, labels: dict[str, str]) -> Self:
         """Describes a job.
 
         Args:
+            status: what :func:`db.activity.of_jobs` says of it.
+            settled: what :func:`db.progress.of_jobs` says of it; None where that is nothing.
             labels: the job's labels.
             share: the share of the proposal that its last region keeps; None without a region, or where there is none.
         """
@@ -72,6 +80,7 @@ class Job(BaseModel):
             kind=row.kind,
             scene=row.scene_id,
             state=JobState(row.state),
+            status=status,
             outcome=None if row.outcome is None else Outcome(row.outcome),
             reason=row.reason,
             error=row.error,
@@ -88,9 +97,7 @@ class Job(BaseModel):
             ended=not row.transitions[row.state],
             labels=labels,
             trace=traces.trace_id(row.traceparent),
-            progress=Progress(
-                settled=None if row.pieces is None else row.pieces - row.open_pairs - row.running_pairs, total=row.pieces, share=share
-            ),
+            progress=Progress(settled=settled and settled[0], total=settled and settled[1], share=share),
         )
 
 

@@ -11,10 +11,10 @@ class Progress(BaseModel):
     """Says how far a job is."""
 
     settled: int | None = Field(
-        description="Number of pieces of the job's last iteration that are settled. A piece is a pair, or a part of a pair whose open "
-        "cells are divided among several. Null before the first iteration."
+        description="Number of pairs that are settled in the job's last iteration, with those whose proofs of earlier ones serve. Null "
+        "before the first iteration."
     )
-    total: int | None = Field(description="Number of pieces of that iteration, without the pairs whose proofs of earlier ones serve.")
+    total: int | None = Field(description="Number of pairs of that iteration, those included.")
     share: float | None = Field(
         description="Share of the proposal that the job's last region keeps, by q-volume, as far as samples say; null without a region."
     )

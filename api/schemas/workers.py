@@ -59,3 +59,7 @@ class WorkerPage(Page):
     """Holds one page of the workers that live, those that began last first."""
 
     workers: list[Worker] = Field(description="The workers.")
+    missing: list[str] = Field(
+        description="What keeps jobs waiting, in the words of their `status`: `no worker`, `no control worker`, `all workers paused` or "
+        "`all control workers paused`. Empty where workers of both kinds take work."
+    )

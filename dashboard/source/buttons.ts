@@ -32,8 +32,9 @@ export function startButtons(): void {
 }
 
 async function press(button: HTMLButtonElement): Promise<void> {
+  const { post: path, follow, statement, confirm: question } = button.dataset;
+  if (question && !confirm(question)) return;
   button.disabled = true;
-  const { post: path, follow, statement } = button.dataset;
   try {
     const answer = await post<Answer>(path!);
     if (follow) location.assign(follow + answer.id);

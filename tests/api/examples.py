@@ -216,7 +216,8 @@ def record(client: TestClient, database: Database) -> dict[str, Any]:
     other = ask("POST", "/v1/jobs", {"kind": "cover", "scene": name, "options": {"coverage": 0.6, "regions": 3}, "deadline_seconds": 40})
     service.ended(other)
     ask("GET", "/v1/jobs/{job_id}/cover", job_id=other["id"])
-    mapped = service.ended(ask("POST", "/v1/jobs", {"kind": "map", "scene": name, "options": {"coverage": 0.6, "at": [home], "paths": [[home, away]]}}))
+    wanted = {"coverage": 0.6, "at": [home], "paths": [[home, away]]}
+    mapped = service.ended(ask("POST", "/v1/jobs", {"kind": "map", "scene": name, "options": wanted}))
     ask("GET", "/v1/jobs/{job_id}/map", job_id=mapped["id"])
     # It ends before it is cancelled: whoever works on what is not wanted any more ends itself, and that is this process.
     batch = ask("POST", "/v1/jobs/batch", {"jobs": [{**seed, "labels": {"batch": "7"}}]})
@@ -331,7 +332,7 @@ def offered(scene: str, home: list[float], away: list[float], region: str) -> di
             },
             {**more, "kind": "certify-path", "bezier": [curve]},
             {**more, "kind": "certify-path", "knots": knots, "control_points": curve},
-            {**more, "kind": "map", "former": "1f9b2a7c", "options": {"coverage": 0.9, "at": [home], "paths": [[home, away]], "random_seed": 1}},
+            {**more, "kind": "map", "former": "1f9b2a7c", "options": {"coverage": 0.9, "at": [home], "paths": [[home]], "random_seed": 1}},
             {**more, "kind": "cover", "options": {**covering, "cells": 1000, "stages": 1, "random_seed": 1}},
         ],
         "/v1/jobs/cancel": [{"jobs": ["1f9b2a7c"]}],

@@ -30,6 +30,8 @@ def test_jobs_are_listed_shown_and_followed_by_the_first_characters_of_their_ids
     short, kind, state, name, *_ = row.split()
     assert (kind, state, name, len(short)) == ("grow", "succeeded", scene.name, 8)
     waiting = queued(database, scene)
+    for said in (ciris("job", "ls").stdout, ciris("job", "show", waiting[:8]).stdout):
+        assert "queued: no worker" in said
     assert [job["id"] for job in ciris("job", "ls", "--state", "queued", "--json").json] == [waiting]
     assert len(ciris("job", "ls", "--most", "1", "--json").json) == 1
     shown = ciris("job", "show", short)

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from certifier.model import Scene
-from db import jobs, scenes, webhooks
+from db import jobs, scenes, steps, webhooks, work
 from db.session import Database
 from db.states import JobState
 from db.types import utcnow
@@ -66,6 +66,21 @@ def orange(browser: Any, png: bytes) -> int:
 def finish(database: Database, job_id: str) -> None:
     with database.write() as session:
         jobs.finish(session, jobs.lock(session, job_id), JobState.SUCCEEDED, reason="as asked", outcome="inconclusive")
+
+
+def test_the_page_finds_out_who_works_without_an_event(page: Any, url: str, database: Database, scene: Scene) -> None:
+    with database.write() as session:
+        job, _ = jobs.create(session, kind="grow", scene_id=scene.hash[:16], options={"seed": {"q": [0.0]}})
+        jobs.start(session, job)
+        steps.add(session, job, "propose", {})
+    page.goto(f"{url}/jobs/{job.id}")
+    page.get_by_text("No process works for the job at this moment.").wait_for()
+    assert page.locator(".title .badge").text_content() == "queued: no worker"
+    page.get_by_text("Queued: no worker.").wait_for()
+    with database.write() as session:
+        assert work.claim(session, job.id, lease_seconds=60, batch_seconds=0.5) is not None
+    page.get_by_text("looks for the first polytope").wait_for()
+    page.locator(".title .badge", has_text="working").wait_for()
 
 
 def test_a_job_is_watched_to_its_end(page: Any, url: str, database: Database, job_id: str) -> None:

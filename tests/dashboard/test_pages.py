@@ -15,10 +15,14 @@ from api.pages.job import progress
 from api.schemas.jobs import Iteration, PairCell, PairMatrix
 from api.schemas.scenes import PairInfo
 from certifier.jobs.region import Region
+from certifier.model import Scene
 from certifier.outcome import Outcome
-from db import regions, scenes
+from db import jobs, pairs, regions, scenes
+from db.pairs import NewPair
 from db.session import Database
 from db.states import IterationState, PairState
+from tests.db.builders import add_iteration
+from tests.db.builders import certified as certified_pair
 from tests.scenes import slider
 
 ROOT = Path(dashboard.__file__).parent
@@ -163,3 +167,30 @@ def test_every_state_of_a_pair_has_a_colour_and_a_key() -> None:
 def test_progress_counts_what_is_settled(matrix: PairMatrix) -> None:
     found = progress(matrix)
     assert (found.parts, found.settled, found.total) == ([("running", 1), ("open", 1), ("reused", 1)], 1, 3)
+
+
+def test_lists_and_pages_count_alike(client: TestClient, database: Database, scene: Scene, running: str) -> None:
+    new = [NewPair(0, "a", "b", 1.0), *(NewPair(1, "a", "c", 1.0, part) for part in range(3))]
+    asked = {"reuse": {3: 0, 4: 0, 6: 0}, "together": {0: (2,), 3: (5,)}, "parts": {1: 3}}
+    with database.write() as session:
+        job = jobs.lock(session, running)
+        add_iteration(session, job, index=0, label="contract", C=[[1.0]], d=[1.0], center=[0.0], pairs=new, **asked)
+    settled = ["4 of 7", "6 of 7"]
+    for said in settled:
+        listed = client.get("/v1/jobs").json()["jobs"][0]["progress"]
+        assert f"{listed['settled']} of {listed['total']}" == said
+        assert f">{said}<" in client.get("/").text
+        assert f"{said} pairs settled" in client.get(f"/jobs/{running}").text
+        with database.write() as session:
+            claim = pairs.claim(session, jobs.lock(session, running), lease_seconds=60, batch_seconds=0.5)
+            assert claim is not None
+            pairs.save(session, claim, certified_pair(0))
+
+
+def test_lists_pages_and_the_api_say_what_a_job_does(client: TestClient, running: str) -> None:
+    (listed,) = client.get("/v1/jobs").json()["jobs"]
+    assert (listed["state"], listed["status"]) == ("running", "queued: no worker")
+    for path in ("/", f"/jobs/{running}"):
+        text = client.get(path).text
+        assert '<span class="badge queued">queued: no worker</span>' in text
+        assert ">running</span>" not in text

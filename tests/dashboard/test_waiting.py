@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 from api.pages.rendering import templates
-from db.models import JobRow
 from jobs.registry import KINDS
 
 
@@ -25,6 +26,7 @@ from jobs.registry import KINDS
 )
 def test_a_job_that_runs_says_what_it_does(kind: str, note: str | None, said: str) -> None:
     part = templates.env.get_template(KINDS[kind].template).module
-    text = str(part.waits(JobRow(kind=kind, state="running"), note))
+    text = str(part.waits(SimpleNamespace(kind=kind, status="working"), note))
     assert text.strip().removeprefix('<p class="empty">').removesuffix("</p>") == said
-    assert "Seeding" not in str(part.waits(JobRow(kind=kind, state="queued"), note))
+    waits = str(part.waits(SimpleNamespace(kind=kind, status="queued: no worker"), note))
+    assert waits.strip() == '<p class="empty">Queued: no worker.</p>', "nobody does any of that"

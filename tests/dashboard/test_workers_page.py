@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import time
 from typing import Any
 
@@ -27,6 +28,11 @@ def test_the_page_shows_what_workers_do_and_pauses_them(page: Any, url: str, bus
     assert "expiry failed: OverflowError" in row.text_content()
     assert row.get_by_role("link", name=busy[:8]).get_attribute("href") == f"/jobs/{busy}"
     assert barriers(page) == []
+    asked: list[str] = []
+    page.once("dialog", lambda dialog: (asked.append(dialog.message), dialog.dismiss()))
+    row.get_by_role("button", name="Pause").click()
+    assert asked == ["This is the last solve worker that takes work. Jobs are queued until you resume it."]
+    page.on("dialog", lambda dialog: dialog.accept())
     row.get_by_role("button", name="Pause").click()
     page.get_by_text("to be paused").wait_for()
     with database.read() as session:
@@ -50,3 +56,20 @@ def test_only_those_who_run_the_service_have_buttons(client: TestClient, busy: s
         assert "1 of 4" in answer.text
         buttons.append("data-post" in answer.text)
     assert buttons == [True, False, False]
+
+
+def test_the_page_says_which_worker_is_missing(client: TestClient, database: Database) -> None:
+    def notices() -> list[str]:
+        return re.findall("<strong>(.*?)</strong>", client.get("/workers/live").text)
+
+    solver, control = (Made(f"host:{kind}:1", kind, "1.2", 4, 8, 2**34) for kind in (WorkerKind.SOLVE, WorkerKind.CONTROL))
+    assert notices() == ["Jobs are queued: no worker."]
+    with database.write() as session:
+        workers.tell(session, control, WorkerState.RUNNING)
+    assert notices() == ["Jobs are queued: no worker."], "a control worker solves nothing"
+    with database.write() as session:
+        workers.tell(session, solver, WorkerState.PAUSED)
+    assert notices() == ["Jobs are queued: all workers paused."]
+    with database.write() as session:
+        workers.tell(session, solver, WorkerState.RUNNING)
+    assert notices() == []

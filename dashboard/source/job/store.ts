@@ -130,18 +130,29 @@ export class JobStore {
     }
   }
 
+  /** Follows the events. Between them a step may begin, and a worker come or go, so the rest is asked for again now and then. */
   private listen(): void {
-    this.stop = follow(
+    const again = setInterval(() => {
+      if (document.hidden) return;
+      this.headSoon();
+      void this.attempt(() => this.who());
+    }, AGAIN_MS);
+    const unfollow = follow(
       this.job,
       this.events.at(-1)?.seq ?? 0,
       (event) => this.take(event),
       connected,
       () => this.end(),
     );
+    this.stop = () => {
+      clearInterval(again);
+      unfollow();
+    };
   }
 
   private end(): void {
     this.ended = true;
+    this.stop();
     void this.head();
     this.syncSoon();
     this.slowSoon();
@@ -220,6 +231,10 @@ export class JobStore {
     this.growth = points;
     this.obstacles = obstacles;
     this.workers = workers;
+  }
+
+  private async who(): Promise<void> {
+    this.workers = (await get<JobWorkers>(`${this.path}/workers`)).workers;
   }
 
   private async head(): Promise<void> {
