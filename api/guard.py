@@ -27,7 +27,8 @@ BODY_BYTES = 16 * 2**20
 """The largest body of a request, in bytes, for every route but uploads. The largest valid request is smaller."""
 UPLOAD_BYTES = 64 * 2**20
 UPLOADS = "/v1/scenes"
-PUBLIC = frozenset({"/healthz", "/readyz", "/login", "/logout"})
+HEALTH = frozenset({"/healthz", "/readyz"})
+PUBLIC = HEALTH | {"/login", "/logout"}
 STATIC = "/static/"
 WATCHED = frozenset({"/metrics"})
 """Monitoring asks for these. They are answered while the database hangs."""
@@ -94,8 +95,11 @@ class Guard:
         """Finds out who asks (``request.state.caller``), except on public paths, and counts the request.
 
         A caller with a valid key is counted by the key, wherever the caller is. So others behind the same address cannot use up the
-        caller's requests. Everybody else is counted by address, before the guard does anything else for them.
+        caller's requests. Everybody else is counted by address, before the guard does anything else for them; so is the first request
+        of a key in this process. Health checks are not counted: who shares an address with them must not have the service ended.
         """
+        if scope["path"] in HEALTH:
+            return
         public = scope["path"] in PUBLIC or scope["path"].startswith(STATIC)
         given = None if public else presented_key(headers)
         caller = None if public else await self._keyring.caller(given, patient=scope["path"] not in WATCHED)

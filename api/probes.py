@@ -26,6 +26,10 @@ from workers.app import CONTROL, SOLVE, waiting
 
 WAIT_SECONDS = 0.5
 """Nobody waits longer than this for an answer."""
+QUICK_SECONDS, COST, BELIEVED_SECONDS, STATISTICS_SECONDS = 0.1, 10.0, 1.0, 60.0
+"""An answer that took longer than QUICK_SECONDS is believed for COST times as long as that, but at most for BELIEVED_SECONDS, or
+STATISTICS_SECONDS for statistics. So nobody slows the others by asking again and again.
+"""
 KEPT_SECONDS = 300.0
 """Statistics that are older than this are not shown any more."""
 OK = "ok"
@@ -37,13 +41,16 @@ T = TypeVar("T")
 class Probe(Generic[T]):
     """A probe asks one thing. Use it from one event loop.
 
+    An answer that took long is believed for a while, but at most for ``seconds``. An error is not.
+
     Args:
         ask: returns the answer. It runs in a thread of its own and may take as long as it likes.
     """
 
-    def __init__(self, ask: Callable[[], T]) -> None:
-        self._ask = ask
+    def __init__(self, ask: Callable[[], T], seconds: float = BELIEVED_SECONDS) -> None:
+        self._ask, self._seconds = ask, seconds
         self._asked: Future[T] | None = None
+        self._until = -math.inf
 
     async def answer(self) -> T:
         """Returns the answer, and raises what asking raises.
@@ -51,9 +58,17 @@ class Probe(Generic[T]):
         Raises:
             TimeoutError: there is no answer within ``WAIT_SECONDS``. The question stays asked.
         """
-        if self._asked is None or self._asked.done():
-            self._asked = _in_thread(self._ask)
+        if self._asked is None or (self._asked.done() and time.monotonic() >= self._until):
+            self._until = -math.inf
+            self._asked = _in_thread(self._timed)
         return await asyncio.wait_for(asyncio.shield(asyncio.wrap_future(self._asked)), WAIT_SECONDS)
+
+    def _timed(self) -> T:
+        began = time.monotonic()
+        found = self._ask()
+        now = time.monotonic()
+        self._until = now + min(COST * max(now - began - QUICK_SECONDS, 0.0), self._seconds)
+        return found
 
 
 def _in_thread(ask: Callable[[], T]) -> Future[T]:
@@ -79,7 +94,7 @@ class Probes:
     def __init__(self, db: Database) -> None:
         self._database, self._queue = Probe(lambda: _database(db)), Probe(_messages)
         self._disk = Probe(lambda: db.disk.trouble() or OK) if db.sqlite else None
-        self._statistics = Probe(lambda: _collected(db))
+        self._statistics = Probe(lambda: _collected(db), STATISTICS_SECONDS)
         self._last: tuple[float, Statistics] | None = None
 
     async def checks(self) -> dict[str, str]:
