@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Annotated
 
+from cachetools import LRUCache
 from fastapi import Depends, Request, Security
 from fastapi.security import HTTPBearer
 from sqlalchemy.exc import TimeoutError as DatabaseTimeoutError
@@ -18,17 +19,19 @@ from starlette.requests import cookie_parser
 
 from certifier.errors import CirisError
 from db import keys, version
-from db.keys import Ring, Scope
+from db.keys import Key, Scope
 from db.models import DEFAULT_PROJECT
 from db.session import UNAVAILABLE, Database
 
 COOKIE = "ciris_key"
 KEYS_SECONDS = 1.0
-"""The keys that were read from the database are trusted for this many seconds."""
+"""A key that was read from the database is trusted for this many seconds."""
 PATIENCE_SECONDS = 0.3
 """A request of monitoring waits this many seconds for the keys."""
 AGAIN_SECONDS = 0.1
 """When requests bring unknown keys, the database is read at most once in this many seconds, however many requests there are."""
+MOST_KEYS = 10_000
+"""This many keys are remembered. The one that was not used for longest is looked up again when it comes."""
 _thread = ThreadPoolExecutor(1, "keys")
 """Every request may wait for the keys, so their reading waits for no other request."""
 
@@ -46,63 +49,89 @@ class Caller:
         return self.name if self.key_id is None else f"{self.name} ({self.key_id})"
 
 
-class Keyring:
-    """A keyring recognises callers by their keys. It reads the keys about twice in ``KEYS_SECONDS``, not for every request.
+@dataclass(frozen=True)
+class _Known:
+    """A key as the database had it at ``read_at``."""
 
-    A revoked key is refused after ``KEYS_SECONDS`` at the latest. While the database answers, no request waits for a reading. What
-    strangers send is not stored, and makes the keyring read the database at most once in ``AGAIN_SECONDS``.
+    key: Key
+    read_at: float
+
+
+class Keyring:
+    """A keyring recognises callers by their keys. It looks each key up by its id, whatever other keys there are.
+
+    It remembers the ``MOST_KEYS`` keys that were used last. About twice in ``KEYS_SECONDS`` it reads those that were used meanwhile
+    again, all at once. So a revoked key is refused after ``KEYS_SECONDS`` at the latest, and a key that is in use never waits for a
+    reading while the database answers. What strangers send is not stored, and makes the keyring read at most once in ``AGAIN_SECONDS``.
 
     It does not read a database of another version: ``database_version`` refuses every caller until the database is of this one.
     """
 
     def __init__(self, database: Database, *, open_without_keys: bool) -> None:
-        self._database, self._open = database, open_without_keys
-        self._ring = Ring({})
+        self._database = database
+        self._open = open_without_keys
+        """Whether callers without a key are let in, as far as is known. Once there is a key, they never are again."""
+        self._known: LRUCache[str, _Known] = LRUCache(MOST_KEYS)
+        self._wanted: set[str] = set()
+        """The ids that the next reading is to look up."""
         self._read_at = -math.inf
         self._reading: asyncio.Future[None] | None = None
 
     async def caller(self, given: str | None, *, patient: bool = True) -> Caller | None:
-        """Returns the caller to whom the key of a request belongs; None when the keys known now do not let this caller in.
+        """Returns the caller to whom the key of a request belongs; None when what is known now does not let this caller in.
 
         Args:
-            patient: False for a request that must be answered while the database hangs: the keys that were read last count then.
+            patient: False for a request that must be answered while the database hangs: what was read last counts then.
 
         Raises:
             sqlalchemy.exc.SQLAlchemyError: the keys cannot be read.
         """
-        fresh = self._as_of(time.monotonic() - KEYS_SECONDS)
-        ring = await (fresh if patient else self._soon(fresh))
-        if self._read_at < time.monotonic() - KEYS_SECONDS / 2:
-            self._read_soon()
-        if given is not None:
-            key = ring.check(given)
-            return None if key is None else Caller(key.scope, key.project, key.id, key.name)
-        return Caller(Scope.ADMIN) if self._open and not ring.keys else None
+        if given is None:
+            return Caller(Scope.ADMIN) if await self._is_open(patient) else None
+        id = keys.id_of(given)
+        key = None if id is None else await self._key(id, patient)
+        return _caller(key) if key is not None and key.opens(given) else None
 
     async def newcomer(self, given: str | None) -> Caller | None:
-        """Returns the caller of a key that :meth:`caller` does not know, which may have just been made; else None."""
-        if given is None or not self._ring.misses(given):
+        """Returns the caller of a key that :meth:`caller` does not know, because nobody has used it here; else None."""
+        id = None if given is None else keys.id_of(given)
+        if id is None or id in self._known:
             return None
-        await self._as_of(time.monotonic(), pause=AGAIN_SECONDS)
+        asked = time.monotonic()
+        while self._read_at < asked:
+            await self._read(id, pause=AGAIN_SECONDS)
         return await self.caller(given)
 
-    async def _as_of(self, moment: float, pause: float = 0.0) -> Ring:
-        """Returns the keys as they were at that moment or later.
+    async def _is_open(self, patient: bool) -> bool:
+        """Says whether the service had no key ``KEYS_SECONDS`` ago or later."""
+        while self._open and self._read_at < time.monotonic() - KEYS_SECONDS:
+            if not await _done(self._read(), patient):
+                if self._read_at == -math.inf:
+                    raise DatabaseTimeoutError("the keys could not be read in time")
+                break
+        if self._open and self._read_at < time.monotonic() - KEYS_SECONDS / 2:
+            self._read_soon()
+        return self._open
+
+    async def _key(self, id: str, patient: bool) -> Key | None:
+        """Returns the key of this id as it was ``KEYS_SECONDS`` ago or later; None where none is known."""
+        while (known := self._known.get(id)) is not None and known.read_at < time.monotonic() - KEYS_SECONDS:
+            if not await _done(self._read(id), patient):
+                break
+        if known is None:
+            return None
+        self._wanted.add(id)
+        if known.read_at < time.monotonic() - KEYS_SECONDS / 2:
+            self._read_soon()
+        return known.key
+
+    async def _read(self, *ids: str, pause: float = 0.0) -> None:
+        """Waits for the reading that is under way, or for the next one, which looks up these ids too.
 
         Of many requests that wait, one reads: ``pause`` seconds after the last reading began. If it fails, it fails for all of them.
         """
-        while self._read_at < moment:
-            await asyncio.shield(self._read_soon(pause))
-        return self._ring
-
-    async def _soon(self, reading: Awaitable[Ring]) -> Ring:
-        """Returns the ring of the reading or, where it takes too long or fails, the last one that was read."""
-        try:
-            return await asyncio.wait_for(reading, PATIENCE_SECONDS)
-        except (TimeoutError, *UNAVAILABLE):
-            if self._read_at == -math.inf:
-                raise DatabaseTimeoutError("the keys could not be read in time") from None
-            return self._ring
+        self._wanted.update(ids)
+        await asyncio.shield(self._read_soon(pause))
 
     def _read_soon(self, pause: float = 0.0) -> asyncio.Future[None]:
         """Returns the reading that is under way, and starts one if there is none."""
@@ -115,16 +144,35 @@ class Keyring:
     async def _read_again(self, not_before: float) -> None:
         try:
             await asyncio.sleep(not_before - time.monotonic())
-            began = time.monotonic()
-            self._ring = await asyncio.get_running_loop().run_in_executor(_thread, self._read)
+            began, ids, self._wanted = time.monotonic(), self._wanted, set()
+            found, self._open = await asyncio.get_running_loop().run_in_executor(_thread, self._look_up, ids)
+            for id in ids - found.keys():
+                self._known.pop(id, None)
+            self._known.update({id: _Known(key, began) for id, key in found.items()})
             self._read_at = began
         finally:
             self._reading = None
 
-    def _read(self) -> Ring:
+    def _look_up(self, ids: set[str]) -> tuple[dict[str, Key], bool]:
+        """Returns the keys that have these ids, by id, and whether the service is open."""
         with self._database.read() as session:
             version.check(session)
-            return keys.ring(session)
+            return keys.find(session, ids), self._open and not keys.exist(session)
+
+
+async def _done(reading: Awaitable[None], patient: bool) -> bool:
+    """Waits for a reading, and says whether it is done: for as long as it takes, or for a moment."""
+    try:
+        await (reading if patient else asyncio.wait_for(reading, PATIENCE_SECONDS))
+    except (TimeoutError, *UNAVAILABLE):
+        if patient:
+            raise
+        return False
+    return True
+
+
+def _caller(key: Key) -> Caller:
+    return Caller(key.scope, key.project, key.id, key.name)
 
 
 def presented_key(headers: Headers) -> str | None:

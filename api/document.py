@@ -75,7 +75,7 @@ ALSO: dict[str, tuple[str, ...]] = {
     "slice_space": CHILDREN,
     "certify_path": CHILDREN,
     "get_graph": CHILDREN,
-    "create_key": ("first_key", "key_name", "busy"),
+    "create_key": ("first_key", "key_name", "too_many_keys", "busy"),
     "revoke_key": ("key_not_found", "busy"),
     "pause_worker": ("worker_draining", "workers_shared", "busy"),
     "resume_worker": ("worker_draining", "workers_shared", "busy"),

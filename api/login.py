@@ -24,7 +24,7 @@ def login_page(request: Request, next: str = "/") -> Response:
 @router.post("/login")
 def sign_in(request: Request, db: WholeDb, key: Annotated[str, Form()], next: Annotated[str, Form()] = "/") -> Response:
     with db.read() as session:
-        valid = keys.ring(session).check(key.strip()) is not None
+        valid = keys.check(session, key.strip()) is not None
     if not valid:
         return page(request, "login.html", {"next": next, "wrong": True}, HTTPStatus.UNAUTHORIZED)
     response = RedirectResponse(_local(next), HTTPStatus.SEE_OTHER)

@@ -1,6 +1,7 @@
 """This module makes and revokes API keys. ``ciris key`` runs it as ``python -m db.keys``.
 
-A key is ``ciris_<id>_<secret>`` with 256 random bits of secret. Nobody can guess it, so a fast hash of it is safe to store.
+A key is ``ciris_<id>_<secret>`` with 256 random bits of secret. Nobody can guess it, so a fast hash of it is safe to store. A key is
+looked up by its id, so that others' keys cost nothing however many there are.
 """
 
 from __future__ import annotations
@@ -10,25 +11,33 @@ import hashlib
 import hmac
 import re
 import secrets
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
 
-from sqlalchemy import select
+from sqlalchemy import delete, exists, func, or_, select, update
 from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
 from db import audit, command_line, pages, projects
 from db.audit import COMMAND_LINE, Action
-from db.models import DEFAULT_PROJECT, ApiKeyRow
+from db.models import DEFAULT_PROJECT, ApiKeyRow, JobRow
 from db.pages import Page
 from db.session import Database
-from db.settings import Settings
+from db.settings import Settings, settings
+from db.states import JOB, unfinished
 from db.types import utcnow
 
+COUNTED_DAYS = 1
+"""A revoked key counts against the limit of its project for this many days, so that making and revoking keys in turn has a limit too."""
+KEPT_DAYS = 30
+"""A revoked key is listed for this many days. Then the service forgets it."""
+KEYS_TOGETHER, JOBS_TOGETHER = 100, 1000
+"""At most this many keys, and mentions of them in jobs, are forgotten in one transaction."""
 _KEY = re.compile(r"ciris_([0-9a-f]{12})_[\w-]{43}", re.ASCII)
 
 
@@ -52,13 +61,14 @@ def add(session: Session, name: str, scope: Scope, project: str = DEFAULT_PROJEC
     """Makes a key of a project and returns it. Only this call ever shows it.
 
     Raises:
-        CirisError: project_not_found; key_name, for a name that cannot be used or that another key of the project has.
+        CirisError: project_not_found; key_name, for a name that cannot be used or that another key of the project has; too_many_keys.
     """
     projects.get(session, project)
     if not projects.NAME.fullmatch(name):
         raise CirisError("key_name", f"{name!r} is no name for a key", field="name", hint="choose up to 64 letters, digits and . _ - @")
     if _active(session, name, project):
         raise CirisError("key_name", f"there is a key {name!r} already", field="name", hint="revoke it, or choose another name")
+    _check_limit(session, project)
     key_id = secrets.token_hex(6)
     key = f"ciris_{key_id}_{secrets.token_urlsafe(32)}"
     session.add(ApiKeyRow(id=key_id, project=project, name=name, digest=_digest(key), scope=scope))
@@ -109,32 +119,47 @@ class Key:
     scope: Scope
     revoked: bool
 
-
-@dataclass(frozen=True)
-class Ring:
-    """A ring holds every key that was made, by its id, as of one moment."""
-
-    keys: dict[str, Key]
-
-    def misses(self, key: str) -> bool:
-        """Says whether this could be a key that was made after that moment: it has the form of a key, and an id that the ring lacks."""
-        parts = _KEY.fullmatch(key)
-        return parts is not None and parts[1] not in self.keys
-
-    def check(self, key: str) -> Key | None:
-        """Returns what is known of a valid key; None for anything else."""
-        parts = _KEY.fullmatch(key)
-        known = self.keys.get(parts[1]) if parts else None
-        if known is None or known.revoked or not hmac.compare_digest(known.digest, _digest(key)):
-            return None
-        return known
+    def opens(self, given: str) -> bool:
+        """Says whether what a caller sent is this key, and may be used."""
+        return not self.revoked and hmac.compare_digest(self.digest, _digest(given))
 
 
-def ring(session: Session) -> Ring:
-    """Returns the keys as they are now."""
+def id_of(given: str) -> str | None:
+    """Returns the id in what a caller sent; None when it has not the form of a key."""
+    parts = _KEY.fullmatch(given)
+    return None if parts is None else parts[1]
+
+
+def find(session: Session, ids: Collection[str]) -> dict[str, Key]:
+    """Returns id -> key for those of these ids that a key has, a revoked one too."""
     columns = (ApiKeyRow.id, ApiKeyRow.project, ApiKeyRow.name, ApiKeyRow.digest, ApiKeyRow.scope, ApiKeyRow.revoked_at.is_not(None))
-    rows = session.execute(select(*columns))
-    return Ring({id: Key(id, project, name, digest, Scope(scope), revoked) for id, project, name, digest, scope, revoked in rows})
+    rows = session.execute(select(*columns).where(ApiKeyRow.id.in_(ids)))
+    return {id: Key(id, project, name, digest, Scope(scope), revoked) for id, project, name, digest, scope, revoked in rows}
+
+
+def check(session: Session, given: str) -> Key | None:
+    """Returns what is known of a valid key; None for anything else."""
+    id = id_of(given)
+    key = None if id is None else find(session, [id]).get(id)
+    return key if key is not None and key.opens(given) else None
+
+
+def forgettable(session: Session, now: datetime) -> Sequence[str]:
+    """Returns the ids of some keys that were revoked ``KEPT_DAYS`` ago and have no job under way.
+
+    The key that was revoked last is never among them: a service that has forgotten its last key would be open.
+    """
+    last = select(func.max(ApiKeyRow.revoked_at)).scalar_subquery()
+    at_work = exists().where(JobRow.key_id == ApiKeyRow.id, JobRow.state.in_(unfinished(JOB)))
+    old = (ApiKeyRow.revoked_at < now - timedelta(days=KEPT_DAYS), ApiKeyRow.revoked_at < last, ~at_work)
+    return session.scalars(select(ApiKeyRow.id).where(*old).order_by(ApiKeyRow.revoked_at).limit(KEYS_TOGETHER)).all()
+
+
+def forget(session: Session, ids: Sequence[str]) -> None:
+    """Deletes those of these keys that no job names any more, and takes their ids out of some of the jobs that do."""
+    named = session.scalars(select(JobRow.id).where(JobRow.key_id.in_(ids)).limit(JOBS_TOGETHER)).all()
+    session.execute(update(JobRow).where(JobRow.id.in_(named)).values(key_id=None))
+    session.execute(delete(ApiKeyRow).where(ApiKeyRow.id.in_(ids), ~exists().where(JobRow.key_id == ApiKeyRow.id)))
 
 
 def check_bind(settings: Settings) -> None:
@@ -162,6 +187,19 @@ def check_bind(settings: Settings) -> None:
 def _active(session: Session, name: str, project: str) -> Sequence[ApiKeyRow]:
     mine = (ApiKeyRow.project == project, ApiKeyRow.name == name)
     return session.scalars(select(ApiKeyRow).where(*mine, ApiKeyRow.revoked_at.is_(None))).all()
+
+
+def _check_limit(session: Session, project: str) -> None:
+    """Refuses another key of a project that has as many as it may. Those revoked lately count."""
+    limit = settings().max_keys_per_project
+    counts = or_(ApiKeyRow.revoked_at.is_(None), ApiKeyRow.revoked_at > utcnow() - timedelta(days=COUNTED_DAYS))
+    if len(session.scalars(select(ApiKeyRow.id).where(ApiKeyRow.project == project, counts).limit(limit)).all()) >= limit:
+        raise CirisError(
+            "too_many_keys",
+            f"the project {project} has {limit} keys, the most that it may have; a revoked key counts for a day more",
+            field="name",
+            hint="revoke keys that nobody uses and try again a day later, or have CIRIS_MAX_KEYS_PER_PROJECT raised",
+        )
 
 
 def _digest(key: str) -> str:

@@ -114,6 +114,7 @@ class ApiKeyRow(Owned, Base):
     """A key lets its holder into a project. The key itself is shown once and not stored."""
 
     __tablename__ = "api_keys"
+    __table_args__ = (Index(None, "project", "created_at", "id"), Index(None, "project", "name"), Index(None, "revoked_at"))
 
     id: Mapped[str] = mapped_column(String(36), primary_key=True)
     """The part of the key that is no secret."""
@@ -150,7 +151,7 @@ class JobRow(Owned, Base):
 
     __tablename__ = "jobs"
     __table_args__ = (
-        Index(None, "state"),
+        Index(None, "state", "project", "key_id"),
         Index(None, "project", "created_at", "id"),
         Index(None, "project", "bytes"),
         UniqueConstraint("parent_id", "number"),
@@ -181,11 +182,11 @@ class JobRow(Owned, Base):
     request_digest: Mapped[str | None] = mapped_column(String(64))
     """SHA-256 of the request. It tells a repetition from a different request under the same key."""
     key_id: Mapped[str | None] = mapped_column(ForeignKey("api_keys.id"), index=True)
-    """Id of the API key whose job it is; None where the service asks for no key."""
+    """Id of the API key whose job it is; None where the service asks for no key, or has forgotten it."""
     priority: Mapped[int] = mapped_column(default=0)
     """Each step up doubles the job's share of its key's work."""
     served: Mapped[float] = mapped_column(default=0.0)
-    """Seconds of work that the job was given, divided by its share. The job with the least goes next (db.work)."""
+    """Seconds of work that the job was given, divided by its share of its project. The least goes next, all else being equal (db.work)."""
     retry_of: Mapped[str | None] = mapped_column(ForeignKey("jobs.id"))
     attempt: Mapped[int] = mapped_column(default=1)
     """1, or one more than the attempt of ``retry_of``."""

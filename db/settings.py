@@ -115,8 +115,12 @@ class Settings(BaseSettings):
     """The process that runs a seeding or a check on request may have an address space of this many bytes."""
     pair_memory_bytes: int = Field(default_factory=_memory_of_a_process)
     """A job with a pair that needs more bytes of memory than this is refused. Default: the memory there is, divided by the cores."""
+    max_jobs_per_project: int = Field(default=2000, ge=1)
+    """One project may have this many unfinished jobs, so that nobody gets more by making keys."""
     max_jobs_per_key: int = Field(default=1000, ge=1)
     """One API key may have this many unfinished jobs. Where the service asks for no key, all callers share the limit."""
+    max_keys_per_project: int = Field(default=500, ge=1)
+    """One project may have this many API keys. Those that were revoked within the last day count."""
 
     kept_motions: int = Field(default=500, ge=0)
     """Number of proved motions of a scene that are kept to answer later questions. The oldest ones go."""

@@ -15,7 +15,7 @@ from kombu.exceptions import OperationalError
 from sqlalchemy.exc import DBAPIError, TimeoutError
 from sqlalchemy.orm import Session
 
-from db import clock, events, jobs, leases, pairs, projects, retention, work, workers
+from db import clock, events, jobs, keys, leases, pairs, projects, retention, work, workers
 from db.models import JobRow, PairRow, StepRow
 from db.session import database
 from db.settings import settings
@@ -50,7 +50,13 @@ def do_round(holders: Holders, troubles: Troubles) -> None:
             holders.could_not_write()
             raise
     # What tidying up fails at says nothing about the holders of leases.
-    for what, chore in (("forgetting workers", forget_gone), ("expiry", expire), ("giving room back", shrink)):
+    chores = {
+        "forgetting workers": forget_gone,
+        "forgetting keys": forget_keys,
+        "expiry": expire,
+        "giving room back": shrink,
+    }
+    for what, chore in chores.items():
         with troubles.noting(what):
             chore()
 
@@ -81,7 +87,7 @@ def sweep(*, by_time: bool = True) -> None:
     release_lost(by_time=by_time)
     with database().read() as session:
         due = jobs.awaiting_coordination(session, clock.now(session))
-        is_open = work.next_job(session) is not None
+        is_open = work.is_there(session)
     for job_id in due[: max(ASKED - waiting(CONTROL), 0)]:
         send_coordinate(job_id)
     if is_open and waiting(SOLVE) == 0:
@@ -95,6 +101,15 @@ def forget_gone() -> None:
     if ids:
         with database().write() as session:
             workers.forget(session, ids)
+
+
+def forget_keys() -> None:
+    """Deletes some of the keys that were revoked long ago."""
+    with database().read() as session:
+        ids = keys.forgettable(session, utcnow())
+    if ids:
+        with database().write() as session:
+            keys.forget(session, ids)
 
 
 def expire() -> None:

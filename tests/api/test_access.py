@@ -28,6 +28,7 @@ from db.keys import Scope
 from db.session import Database
 from tests.api.conftest import BASE_URL, PROBLEM
 from tests.api.test_jobs import GROW
+from tests.services import Queue
 
 
 def a_key(database: Database, scope: Scope, name: str | None = None) -> str:
@@ -203,6 +204,20 @@ def test_who_asks_too_often_is_to_wait(hasty: TestClient, database: Database) ->
     assert (refused.status_code, refused.json()["code"], refused.headers["retry-after"]) == (429, "too_many_requests", "1")
 
 
+def test_health_checks_are_answered_whoever_else_asks_from_their_address(
+    database: Database, queue: Queue, environment: pytest.MonkeyPatch
+) -> None:
+    environment.setenv("CIRIS_REDIS_URL", queue.url)
+    environment.setenv("CIRIS_REQUESTS_PER_SECOND", "0.02")
+    a_key(database, Scope.READ)
+    with TestClient(create_app(database), base_url=BASE_URL) as client:
+        while client.get("/v1/jobs", headers=bearer("x")).status_code == 401:
+            pass
+        for path in ("/healthz", "/readyz"):
+            assert {client.get(path).status_code for _ in range(20)} == {200}
+        assert client.get("/login").status_code == 429, "what else needs no key is counted"
+
+
 def test_every_key_has_its_own_rate(hasty: TestClient, database: Database) -> None:
     one, other = a_key(database, Scope.READ, "one"), a_key(database, Scope.READ, "other")
     while hasty.get("/v1/jobs", headers=bearer(one)).status_code == 200:
@@ -261,7 +276,7 @@ def test_a_wrong_secret_counts_against_the_address_and_reads_nothing(hasty: Test
 
 
 def test_of_many_unknown_keys_at_once_one_has_the_keys_read(database: Database) -> None:
-    key = a_key(database, Scope.READ)
+    a_key(database, Scope.READ)
     keyring = Keyring(database, open_without_keys=False)
 
     async def ask() -> list[Caller | None]:
@@ -276,22 +291,37 @@ def test_of_many_unknown_keys_at_once_one_has_the_keys_read(database: Database) 
     assert set(strangers) == {None}
     assert caller is not None
     assert caller.scope == Scope.ADMIN
-    assert set(keyring._ring.keys) == {key.split("_")[1], caller.key_id}, "nothing is kept of what strangers sent"
+    assert set(keyring._known) == {caller.key_id}, "nothing is kept of what strangers sent"
+
+
+def test_keys_in_use_are_read_again_together_and_others_are_not(database: Database) -> None:
+    used, unused = [a_key(database, Scope.READ, f"used{i}") for i in range(5)], a_key(database, Scope.READ, "unused")
+    keyring = Keyring(database, open_without_keys=False)
+
+    async def ask() -> list[str]:
+        for key in (*used, unused):
+            assert await keyring.newcomer(key) is not None
+        await asyncio.sleep(KEYS_SECONDS)
+        with readings(database) as seen:
+            assert None not in await asyncio.gather(*(keyring.caller(key) for key in used))
+        return seen
+
+    assert len(asyncio.run(ask())) == 1
 
 
 def test_keys_that_cannot_be_read_let_nobody_in_and_are_read_again(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
     key = a_key(database, Scope.READ)
     keyring = Keyring(database, open_without_keys=True)
 
-    def fail(_session: object) -> None:
+    def fail(*_: object) -> None:
         raise OperationalError("SELECT 1", {}, Exception("connection refused"))
 
     async def ask() -> Caller | None:
         with monkeypatch.context() as patch:
-            patch.setattr(keys, "ring", fail)
-            failures = await asyncio.gather(*(keyring.caller(given) for given in (key, None)), return_exceptions=True)
+            patch.setattr(keys, "find", fail)
+            failures = await asyncio.gather(keyring.newcomer(key), keyring.caller(None), return_exceptions=True)
         assert [type(failure) for failure in failures] == [OperationalError] * 2
-        return await keyring.caller(key)
+        return await keyring.newcomer(key)
 
     caller = asyncio.run(ask())
     assert caller is not None

@@ -174,6 +174,6 @@ def test_a_database_that_is_away_is_no_error_of_the_program(
         answer = client.get("/v1/jobs")
         assert (answer.status_code, answer.json()["code"], answer.headers["retry-after"]) == (503, "database_unavailable", "5")
         assert "secret" not in answer.text
-        monkeypatch.setattr("db.keys.ring", fail)
+        monkeypatch.setattr("db.keys.find", fail)
         time.sleep(KEYS_SECONDS)
         assert client.get("/v1/scenes").status_code == 503, "the guard itself needs the database"

@@ -1,30 +1,33 @@
-"""Claiming and saving a pair costs the same however many pairs the iteration has."""
+"""What claiming and saving a pair costs, however many pairs the iteration has; and letting a caller in, however many keys there are."""
 
 from __future__ import annotations
 
+import secrets
 import sqlite3
 from collections.abc import Callable
 from typing import Any
 
 import pytest
-from sqlalchemy import text
+from sqlalchemy import insert, text
 from sqlalchemy.orm import Session
 
-from db import jobs, leases, pairs, work
-from db.models import PairRow
+from db import jobs, keys, leases, pairs, projects, work
+from db.keys import Scope
+from db.models import DEFAULT_PROJECT, ApiKeyRow, PairRow
 from db.session import Database
 from db.states import JobState
+from db.types import utcnow
 from tests.db.builders import a_running_job, certified
 
 
-def effort(db: Database, call: Callable[[Session], Any]) -> tuple[Any, int]:
-    """What the call returns, and its effort: hundreds of instructions of SQLite's machine, or pairs that PostgreSQL reads."""
+def effort(db: Database, call: Callable[[Session], Any], table: str = "pairs") -> tuple[Any, int]:
+    """What the call returns, and its effort: hundreds of instructions of SQLite's machine, or rows of the table that PostgreSQL reads."""
     with db.write() as session:
         if not db.sqlite:
-            before = _read(session)
+            before = _read(session, table)
             answer = call(session)
             session.flush()
-            return answer, _read(session) - before
+            return answer, _read(session, table) - before
         raw = session.connection().connection.driver_connection
         assert isinstance(raw, sqlite3.Connection)
         ticks: list[None] = []
@@ -37,10 +40,10 @@ def effort(db: Database, call: Callable[[Session], Any]) -> tuple[Any, int]:
         return answer, len(ticks)
 
 
-def _read(session: Session) -> int:
-    """How many rows of pairs PostgreSQL read for this connection; it now and then begins to count anew, but not in a transaction."""
-    query = "SELECT seq_tup_read + idx_tup_fetch FROM pg_stat_xact_user_tables WHERE relname = 'pairs'"
-    return int(session.scalar(text(query)) or 0)
+def _read(session: Session, table: str) -> int:
+    """How many rows of the table PostgreSQL read for this connection; it now and then begins to count anew, but not in a transaction."""
+    query = "SELECT seq_tup_read + idx_tup_fetch FROM pg_stat_xact_user_tables WHERE relname = :name"
+    return int(session.scalar(text(query), {"name": table}) or 0)
 
 
 def efforts(db: Database, pair_count: int, settled: int, counted: bool = False) -> dict[str, int]:
@@ -75,4 +78,36 @@ def test_the_effort_for_a_pair_does_not_grow_with_the_number_of_pairs(db: Databa
     """Whatever PostgreSQL's statistics are from: it makes them now and then, and knows nothing of what was added since."""
     few = efforts(db, pair_count=400, settled=200, counted=0 in counted)
     many = efforts(db, pair_count=8000, settled=4000, counted=1 in counted)
+    assert {call: many[call] for call in many if many[call] > few[call] + 5} == {}, few
+
+
+def efforts_of_keys(db: Database, key: str) -> dict[str, int]:
+    calls: dict[str, Callable[[Session], Any]] = {
+        "let a caller in": lambda session: keys.check(session, key),
+        "say that there are keys": keys.exist,
+        "make a key": lambda session: keys.add(session, f"key{secrets.token_hex(4)}", Scope.READ),
+        "list keys": lambda session: keys.page(session, limit=1),
+        "forget keys": lambda session: keys.forgettable(session, utcnow()),
+    }
+    found = {}
+    for name, call in calls.items():
+        with db.of(DEFAULT_PROJECT).read() as session:
+            call(session) if name != "make a key" else None  # SQLite reads the tables' definitions first
+        found[name] = effort(db.of(DEFAULT_PROJECT), call, "api_keys")[1]
+    return found
+
+
+def test_the_effort_for_a_key_does_not_grow_with_the_number_of_keys_of_another_project(db: Database) -> None:
+    with db.write() as session:
+        projects.add(session, "others")
+        key = keys.add(session, "planner", Scope.READ)
+    few = efforts_of_keys(db, key)
+    day = {"digest": "", "scope": "read", "created_at": utcnow()}
+    with db.write() as session:
+        for revoked_at in (None, utcnow()):
+            rows = [
+                {"id": secrets.token_hex(6), "project": "others", "name": f"k{i}", "revoked_at": revoked_at, **day} for i in range(5000)
+            ]
+            session.execute(insert(ApiKeyRow), rows)
+    many = efforts_of_keys(db, key)
     assert {call: many[call] for call in many if many[call] > few[call] + 5} == {}, few

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import json
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sqlalchemy import text
+from sqlalchemy import select, text, update
+from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from db import keys, migrate
+from db import jobs, keys, migrate, projects
 from db.keys import Scope
+from db.models import DEFAULT_PROJECT, ApiKeyRow, JobRow
 from db.session import Database
-from db.settings import Settings
+from db.settings import Settings, settings
+from db.types import utcnow
+from tests.db.builders import a_job
 
 
 def test_a_key_is_valid_until_it_is_revoked(db: Database) -> None:
@@ -22,12 +27,12 @@ def test_a_key_is_valid_until_it_is_revoked(db: Database) -> None:
         assert not keys.exist(session)
         key = keys.add(session, "planner", Scope.READ)
     with db.write() as session:
-        row = keys.ring(session).check(key)
+        row = keys.check(session, key)
         assert row is not None
         assert (row.name, row.scope) == ("planner", "read")
         keys.revoke(session, "planner")
     with db.read() as session:
-        assert keys.ring(session).check(key) is None
+        assert keys.check(session, key) is None
         assert keys.exist(session), "revoking the last key does not open the service"
 
 
@@ -41,8 +46,8 @@ def test_a_name_serves_again_once_its_key_is_revoked(db: Database) -> None:
             keys.revoke(session, "planner")
         second = keys.add(session, "planner", Scope.SUBMIT)
     with db.read() as session:
-        assert keys.ring(session).check(first) is None
-        assert keys.ring(session).check(second) is not None
+        assert keys.check(session, first) is None
+        assert keys.check(session, second) is not None
 
 
 def test_the_database_does_not_hold_the_key(db: Database) -> None:
@@ -60,8 +65,8 @@ def test_no_other_key_is_valid(key_database: tuple[Database, str], place: int, l
     database, key = key_database
     other = key[: place % len(key)] + letter + key[place % len(key) + 1 :]
     with database.read() as session:
-        assert (keys.ring(session).check(other) is not None) == (other == key)
-        assert keys.ring(session).check(key + letter) is None
+        assert (keys.check(session, other) is not None) == (other == key)
+        assert keys.check(session, key + letter) is None
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +76,73 @@ def key_database(tmp_path_factory: pytest.TempPathFactory, migrated_sqlite: Path
     database = Database(f"sqlite:///{path}")
     with database.write() as session:
         return database, keys.add(session, "planner", Scope.READ)
+
+
+def test_a_project_has_a_limited_number_of_keys(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(settings(), "max_keys_per_project", 2)
+    with db.write() as session:
+        projects.add(session, "others")
+        for name in ("a", "b"):
+            keys.add(session, name, Scope.READ)
+        with pytest.raises(CirisError, match="CIRIS_MAX_KEYS_PER_PROJECT") as refused:
+            keys.add(session, "c", Scope.READ)
+        assert refused.value.code == "too_many_keys"
+        keys.add(session, "a", Scope.READ, "others")
+        keys.revoke(session, "a")
+        with pytest.raises(CirisError, match="a revoked key counts for a day more"):
+            keys.add(session, "c", Scope.READ)
+        revoked_ago(session, "a", keys.COUNTED_DAYS)
+        keys.add(session, "c", Scope.READ)
+
+
+def revoked_ago(session: Session, name: str, days: float) -> None:
+    mine = (ApiKeyRow.name == name, ApiKeyRow.project == DEFAULT_PROJECT)
+    session.execute(update(ApiKeyRow).where(*mine).values(revoked_at=utcnow() - timedelta(days=days)))
+
+
+def forget(db: Database) -> set[str]:
+    """The names of the keys that are left when the service has forgotten what it may."""
+    while True:
+        with db.write() as session:
+            ids = keys.forgettable(session, utcnow())
+            if not ids:
+                return set(session.scalars(select(ApiKeyRow.name)))
+            keys.forget(session, ids)
+
+
+def test_a_revoked_key_is_forgotten_after_a_time(db: Database) -> None:
+    with db.write() as session:
+        for name in ("used", "old", "lately"):
+            keys.add(session, name, Scope.READ)
+        revoked_ago(session, "old", keys.KEPT_DAYS)
+        revoked_ago(session, "lately", keys.KEPT_DAYS - 1)
+    assert forget(db) == {"used", "lately"}
+
+
+def test_the_last_key_is_never_forgotten_because_the_service_would_be_open(db: Database) -> None:
+    with db.write() as session:
+        for days, name in enumerate(("last", "before")):
+            keys.add(session, name, Scope.READ)
+            revoked_ago(session, name, 2 * keys.KEPT_DAYS + days)
+    assert forget(db) == {"last"}
+
+
+def test_a_key_is_forgotten_once_its_jobs_have_ended(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(keys, "JOBS_TOGETHER", 2)
+    with db.write() as session:
+        for name in ("gone", "stays"):
+            keys.add(session, name, Scope.SUBMIT)
+        key_id = session.scalars(select(ApiKeyRow.id).where(ApiKeyRow.name == "gone")).one()
+        ids = [a_job(session, key_id=key_id).id for _ in range(5)]
+        revoked_ago(session, "gone", keys.KEPT_DAYS)
+        revoked_ago(session, "stays", 0)
+    assert forget(db) == {"gone", "stays"}
+    with db.write() as session:
+        for job_id in ids:
+            jobs.cancel(session, job_id)
+    assert forget(db) == {"stays"}
+    with db.read() as session:
+        assert {job.key_id for job in session.scalars(select(JobRow))} == {None}
 
 
 @pytest.mark.parametrize("name", ["", "-x", "a b", "a" * 65, "a\n"])

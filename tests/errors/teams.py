@@ -11,6 +11,7 @@ from db import command_line, jobs, keys, projects, retention
 from db.disk import Disk
 from db.keys import Scope
 from db.models import JobRow
+from db.settings import settings
 from db.vault import Vault, kept_key
 from tests.db.builders import a_running_job, add_region
 from tests.errors.service import GROW, post, queued, write
@@ -70,6 +71,13 @@ def by_a_few_characters(t: Trial) -> None:
         retention.delete_job(session, a_running_job(session).id[:8], dependents=True)
 
 
+def one_key_too_many(t: Trial) -> None:
+    t.need("environment").setenv("CIRIS_MAX_KEYS_PER_PROJECT", "1")
+    settings.cache_clear()
+    for name in ("planner", "another"):
+        write(t, lambda session, name=name: keys.add(session, name, Scope.READ))
+
+
 TEAMS: Table = {
     ("project_name", "name"): [lambda t: write(t, lambda session: projects.add(session, "a b")), lambda t: write(t, named_twice)],
     ("project_not_found", "project"): [lambda t: write(t, lambda session: keys.add(session, "planner", Scope.READ, "nobody"))],
@@ -88,6 +96,7 @@ TEAMS: Table = {
     ("webhook_waits", "job"): [resent_too_soon],
     ("storage_quota", ""): [full],
     ("no_room", ""): [without_room],
+    ("too_many_keys", "name"): [one_key_too_many],
     ("first_key", "name"): [lambda t: t.ask("POST", "/v1/keys", json={"name": "mine", "scope": "admin"})],
     ("bad_option", "--label"): [lambda t: t.ciris("job", "ls", "--label", "team")],
     ("bad_option", "--data"): [lambda t: t.ciris("key", "ls", "--url", "http://127.0.0.1:9", "--data", "here")],
