@@ -8,7 +8,7 @@ from datetime import datetime, timedelta
 from typing import Any
 from uuid import uuid4
 
-from sqlalchemy import ColumnElement, and_, exists, func, or_, select
+from sqlalchemy import and_, exists, func, or_, select
 from sqlalchemy.orm import Session, aliased
 
 from certifier.errors import CirisError
@@ -51,7 +51,7 @@ def create(
 
     Raises:
         CirisError: scene_not_found, when the scene was deleted a moment ago; idempotency_conflict, when the key was used for a
-            different request; quota_exceeded, when the API key has as many unfinished jobs as it may.
+            different request; quota_exceeded, when the project or the API key has as many unfinished jobs as it may.
     """
     job_id = str(uuid4())
     now = clock.now(session)
@@ -76,7 +76,7 @@ def create(
     }
     if insert_new(session, JobRow, [new]):
         if parent_id is None:
-            _check_quota(session, key_id)
+            _check_quota(session, new["project"], key_id)
         job = lock(session, job_id)
         labels.put(session, job_id, given_labels or {})
         events.emit(session, job, "job", {"state": job.state})
@@ -101,21 +101,23 @@ def _project_of(session: Session, scene_id: str) -> str:
     return project
 
 
-def _check_quota(session: Session, key_id: str | None) -> None:
-    """Refuses the job just added when its API key has too many unfinished jobs, those of a cover not counted.
+def _check_quota(session: Session, project: str, key_id: str | None) -> None:
+    """Refuses the job just added when its project or its API key has too many unfinished jobs, those of a cover not counted.
 
-    Several requests at the same moment may each count as the last job that fits, so a key can exceed its limit a little.
+    Several requests at the same moment may each count as the last job that fits, so a limit may be exceeded a little.
     """
-    limit = settings().max_jobs_per_key
-    counted = (_of_key(key_id), JobRow.state.in_(unfinished(JOB)), JobRow.parent_id.is_(None))
-    unfinished_jobs = session.scalar(select(func.count()).where(*counted)) or 0
-    if unfinished_jobs > limit:
-        message = f"{limit} jobs that have not ended are the most at a time"
-        raise CirisError("quota_exceeded", message, hint="wait for some to end, cancel some, or have CIRIS_MAX_JOBS_PER_KEY raised")
+    most_of_key, most_of_project = settings().max_jobs_per_key, settings().max_jobs_per_project
+    counted = (JobRow.project == project, JobRow.state.in_(unfinished(JOB)), JobRow.parent_id.is_(None))
+    counts = dict(session.execute(select(JobRow.key_id, func.count()).where(*counted).group_by(JobRow.key_id)).all())
+    if counts[key_id] > most_of_key:
+        raise _too_many("an API key", most_of_key, "CIRIS_MAX_JOBS_PER_KEY")
+    if sum(counts.values()) > most_of_project:
+        raise _too_many("a project", most_of_project, "CIRIS_MAX_JOBS_PER_PROJECT")
 
 
-def _of_key(key_id: str | None) -> ColumnElement[bool]:
-    return JobRow.key_id.is_not_distinct_from(key_id)
+def _too_many(who: str, limit: int, setting: str) -> CirisError:
+    message = f"{limit} jobs that have not ended are the most that {who} may have at a time"
+    return CirisError("quota_exceeded", message, hint=f"wait for some to end, cancel some, or have {setting} raised")
 
 
 def retry(session: Session, job_id: str, key_id: str | None = None) -> JobRow:
@@ -275,15 +277,18 @@ def start(session: Session, job: JobRow, served: float = 0.0) -> None:
 
 
 def charge(session: Session, job: JobRow, seconds: float) -> None:
-    """Counts seconds of work as done for the job. Each API key has the same share of the workers.
+    """Counts seconds of work as done for the job, divided by the job's share of its project.
 
-    The running jobs of a key divide that share in proportion to 2^priority. A job leaves its part to those that it has made.
+    The keys of a project that have running jobs share equally. The running jobs of a key divide its part in proportion to 2^priority. A
+    job leaves its part to those that it has made.
     """
     other = aliased(JobRow)
     leaves = exists().where(other.parent_id == JobRow.id, other.state == JobState.RUNNING)
-    at_work = (_of_key(job.key_id), JobRow.state == JobState.RUNNING, ~leaves)
-    running = session.scalars(select(JobRow.priority).where(*at_work))
-    job.served += seconds * sum(2.0 ** (priority - job.priority) for priority in running)
+    at_work = (JobRow.project == job.project, JobRow.state == JobState.RUNNING, ~leaves)
+    counts = select(JobRow.key_id, JobRow.priority, func.count()).where(*at_work).group_by(JobRow.key_id, JobRow.priority)
+    rows = session.execute(counts).all()
+    keys = len({key_id for key_id, _, _ in rows})
+    job.served += seconds * keys * sum(count * 2.0 ** (priority - job.priority) for key_id, priority, count in rows if key_id == job.key_id)
 
 
 def finish(

@@ -220,6 +220,16 @@ def count_of_workers(session: Session) -> Counter[str]:
     return counts
 
 
+def count_of_keys(session: Session) -> Counter[tuple[str, str | None]]:
+    """Returns how many leases work of each API key is held under, by (project, key)."""
+    counts: Counter[tuple[str, str | None]] = Counter()
+    for model in (PairRow, StepRow):
+        held = select(JobRow.project, JobRow.key_id, func.count(model.lease_token.distinct())).join(JobRow, JobRow.id == model.job_id)
+        held = held.where(model.state == RUNNING).group_by(JobRow.project, JobRow.key_id)
+        counts.update({(project, key_id): count for project, key_id, count in session.execute(held)})
+    return counts
+
+
 def release(session: Session, model: type[Row], lost: Lost) -> list[Row]:
     """Opens the rows of a lost lease and returns them. Their holder can save nothing any more."""
     ids = list(session.scalars(select(model.id).where(held(model, lost.token))))

@@ -1,10 +1,12 @@
-"""This module decides what the workers do next: a fair order over API keys and jobs, in which every job gets its turn.
+"""This module decides what the workers do next: a fair order over projects, API keys and jobs, in which every job gets its turn.
 
-A message to the solvers only says that there is work. Which work it is, this module decides when a solver is free. Every key has the
-same share of the workers, however many jobs it has. Within a key, each step of priority doubles a job's share.
+A message to the solvers only says that there is work. Which work it is, this module decides when a solver is free. It goes to the
+project whose work the fewest solvers do now, however many keys and jobs the project has; within it to the key of which the same is
+true; within the key to the job that was served least. So a newcomer gets the next solver that is free, however long pieces of others
+take. Projects and keys of which as many solvers work take turns.
 
 ``jobs.served`` counts the seconds that a job was given, divided by its share. The job with the least goes next (stride scheduling:
-Waldspurger, Weihl 1995).
+Waldspurger, Weihl 1995). Each step of priority doubles a job's share of its key's work.
 
 The queries are built once, with the time and the job as parameters, because building one takes longer than running it.
 """
@@ -12,10 +14,11 @@ The queries are built once, with the time and the job as parameters, because bui
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from functools import cache
 
-from sqlalchemy import ColumnElement, Select, and_, bindparam, case, exists, func, or_, select
+from sqlalchemy import ColumnElement, Row, Select, and_, bindparam, case, exists, func, or_, select
 from sqlalchemy.orm import Session, aliased
 
 from db import jobs, leases, pairs, steps
@@ -23,18 +26,50 @@ from db.models import JobRow, PairRow, StepRow
 from db.states import ACCEPT, JobState, PairState, StepState
 from db.types import Utc, utcnow
 
+MOST_KEYS = 100_000
+"""The jobs of at most this many keys are compared when the next one is chosen."""
 ROUNDING = 1e-9
 """Sums of fractions of batches may be too large by so much."""
 
 
 def next_job(session: Session) -> str | None:
     """Returns the id of the job whose work is done next; None when there is no work."""
-    return next(iter(in_order(session, 1)), None)
+    return next(iter(_in_turn(session, places=1, most=MOST_KEYS)), None)
 
 
 def in_order(session: Session, limit: int) -> Sequence[str]:
-    """Returns the ids of at most this many jobs with work that nobody does, in the order in which they get a worker."""
-    return session.scalars(_in_order(), {"now": utcnow(), "limit": limit}).all()
+    """Returns the ids of at most this many jobs with work that nobody does, in the order in which they get a worker as things are."""
+    return _in_turn(session, places=limit, most=limit)
+
+
+def _in_turn(session: Session, places: int, most: int) -> Sequence[str]:
+    """Returns the ids of jobs with work: the first one of each key, by turns, then the second one of each key, and so on.
+
+    Args:
+        places: how many jobs of a key are among them.
+        most: how many jobs are.
+    """
+    found = session.execute(_placed(), {"now": utcnow(), "places": places, "most": most}).all()
+    if len(found) < 2:
+        return [one.id for one in found]
+    of_key = leases.count_of_keys(session)
+    of_project: Counter[str] = Counter()
+    for (project, _), count in of_key.items():
+        of_project[project] += count
+    served: dict[str, float] = {}
+    for one in found:
+        served[one.project] = min(one.served, served.get(one.project, math.inf))
+
+    def turn(one: Row[tuple[str, str, str | None, float, int]]) -> tuple[int, int, float, str, int, float, str]:
+        project, key = one.project, (one.project, one.key_id)
+        return one.place, of_project[project], served[project], project, of_key[key], one.served, one.key_id or ""
+
+    return [one.id for one in sorted(found, key=turn)]
+
+
+def is_there(session: Session) -> bool:
+    """Says whether there is work."""
+    return session.scalar(_any(), {"now": utcnow()}) is not None
 
 
 def claim(session: Session, job_id: str, *, lease_seconds: float, batch_seconds: float) -> pairs.Claim | steps.Claim | None:
@@ -86,8 +121,21 @@ _NOW = bindparam("now", type_=Utc())
 
 
 @cache
-def _in_order() -> Select[str]:
-    return select(JobRow.id).where(_has_work()).order_by(JobRow.served, JobRow.created_at, JobRow.id).limit(bindparam("limit"))
+def _placed() -> Select[tuple[str, str, str | None, float, int]]:
+    """Returns the query for the jobs of each key in the order in which they are served: the one served least, and of several the newest.
+
+    So a job that has just started gets its first piece at once, also beside a hundred of the same key.
+    """
+    order = (JobRow.served, JobRow.created_at.desc(), JobRow.id)
+    place = func.row_number().over(partition_by=(JobRow.project, JobRow.key_id), order_by=order).label("place")
+    placed = select(JobRow.id, JobRow.project, JobRow.key_id, JobRow.served, place).where(_has_work()).subquery()
+    columns = (placed.c.id, placed.c.project, placed.c.key_id, placed.c.served, placed.c.place)
+    return select(*columns).where(placed.c.place <= bindparam("places")).order_by(placed.c.place).limit(bindparam("most"))
+
+
+@cache
+def _any() -> Select[tuple[str]]:
+    return select(JobRow.id).where(_has_work()).limit(1)
 
 
 @cache

@@ -56,5 +56,5 @@ def claim_piece() -> tuple[pairs.Claim | steps.Claim | None, bool]:
         with database().write() as session:
             claim = queue.claim(session, job_id, lease_seconds=limits.lease_seconds, batch_seconds=limits.batch_seconds)
         with database().read() as session:  # when others may claim already
-            more = queue.next_job(session) is not None
+            more = queue.is_there(session)
     return claim, more

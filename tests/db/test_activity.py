@@ -91,7 +91,7 @@ def test_jobs_of_other_projects_count_among_the_others(db: Database) -> None:
         jobs.start(session, job, served=5.0)
         steps.add(session, job, "propose", {})
         session.flush()
-        assert does(session, job) == ["queued: behind 2 others"]
+        assert does(session, job) == ["queued: behind 1 other"]  # projects take turns, so it comes before the second job of the first one
 
 
 def test_a_job_works_while_a_lease_lasts_and_is_stalled_after_it(db: Database) -> None:

@@ -1,8 +1,9 @@
-"""The order of work: batches, and shares of jobs and keys, on both databases."""
+"""The order of work: batches, and shares of projects, keys and jobs, on both databases."""
 
 from __future__ import annotations
 
-from collections import Counter
+import heapq
+from collections import Counter, defaultdict
 from datetime import timedelta
 
 import pytest
@@ -10,14 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from certifier.errors import CirisError
-from db import jobs, pairs, steps, work
-from db.models import ApiKeyRow, JobRow
+from db import jobs, pairs, projects, steps, work
+from db.models import DEFAULT_PROJECT, ApiKeyRow, JobRow, ProjectRow
 from db.pairs import batch
 from db.session import Database
 from db.settings import settings
 from db.states import JobState, StepState
 from db.types import utcnow
-from tests.db.builders import a_job, add_pairs
+from tests.db.builders import a_job, add_pairs, certified
 
 forecasts = st.lists(st.floats(0, 2), max_size=60)
 
@@ -47,15 +48,67 @@ def run(db: Database, pieces: int) -> list[str]:
     return order
 
 
-def a_job_of(db: Database, key: str | None = None, priority: int = 0, pair_count: int = 60) -> str:
+def a_job_of(db: Database, key: str | None = None, priority: int = 0, pair_count: int = 60, project: str = DEFAULT_PROJECT) -> str:
     with db.write() as session:
+        if session.get(ProjectRow, project) is None:
+            projects.add(session, project)
         if key is not None and session.get(ApiKeyRow, key) is None:
-            session.add(ApiKeyRow(id=key, name=key, digest="", scope="submit"))
+            session.add(ApiKeyRow(id=key, name=key, project=project, digest="", scope="submit"))
             session.flush()
+    with db.of(project).write() as session:
         job = a_job(session, key_id=key, priority=priority)
+    with db.write() as session:
+        job = jobs.lock(session, job.id)
         jobs.start(session, job, work.served_by_now(session))
-        add_pairs(session, job, pair_count)
+        if pair_count:
+            add_pairs(session, job, pair_count)
         return job.id
+
+
+def a_step(db: Database, job_id: str) -> None:
+    """Gives the job a long piece of work that it waits for."""
+    with db.write() as session:
+        job = jobs.lock(session, job_id)
+        job.turn += 1
+        steps.add(session, job, "propose", {})
+
+
+class Solvers:
+    """A number of solvers in a time of their own: pieces of pairs take what was forecast, 1 s, and steps take ``step_seconds``.
+
+    A job whose step is done waits for the next one at once.
+
+    Attributes:
+        seconds: job -> the seconds of solvers that it was given.
+        began: job -> when its first piece began.
+    """
+
+    def __init__(self, db: Database, solvers: int, step_seconds: float) -> None:
+        self._db, self._step_seconds = db, step_seconds
+        self._free: list[tuple[float, int, pairs.Claim | steps.Claim | None]] = [(0.0, i, None) for i in range(solvers)]
+        self.seconds: defaultdict[str, float] = defaultdict(float)
+        self.began: dict[str, float] = {}
+
+    def run_until(self, end: float) -> None:
+        while self._free[0][0] < end:
+            now, solver, done = heapq.heappop(self._free)
+            if isinstance(done, pairs.Claim):
+                with self._db.write() as session:
+                    pairs.save(session, done, {(pair.index, 0): certified(pair.index)[pair.index, 0] for pair in done.pairs})
+            elif done is not None:
+                with self._db.write() as session:
+                    assert steps.save(session, done, StepState.DONE, {}, self._step_seconds)
+                a_step(self._db, done.job_id)
+            with self._db.read() as session:
+                job_id = work.next_job(session)
+            assert job_id is not None
+            with self._db.write() as session:
+                claim = work.claim(session, job_id, lease_seconds=60, batch_seconds=0.5)
+            assert claim is not None
+            seconds = self._step_seconds if isinstance(claim, steps.Claim) else float(len(claim.pairs))
+            self.began.setdefault(job_id, now)
+            self.seconds[job_id] += seconds
+            heapq.heappush(self._free, (now + seconds, solver, claim))
 
 
 def test_jobs_take_turns_whatever_their_length(db: Database) -> None:
@@ -71,12 +124,49 @@ def test_a_step_of_priority_doubles_the_share_and_nobody_starves(db: Database) -
     assert [shares[jobs_by_priority[priority]] for priority in (1, 0, -1)] == pytest.approx([16, 8, 4], abs=1)
 
 
-def test_keys_have_equal_shares_however_many_jobs_they_have(db: Database) -> None:
+def test_keys_of_a_project_have_equal_shares_however_many_jobs_they_have(db: Database) -> None:
     many = {a_job_of(db, "many", priority=3) for _ in range(5)}
     one = a_job_of(db, "one")
     shares = Counter(run(db, 30))
     assert shares[one] == pytest.approx(15, abs=1)
     assert all(shares[job_id] == pytest.approx(3, abs=1) for job_id in many)
+
+
+@pytest.mark.parametrize("solvers", [1, 3, 4])
+def test_projects_have_equal_shares_however_many_keys_they_have(db: Database, solvers: int) -> None:
+    """Keys cost nothing, and an admin makes as many as wanted."""
+    nine = [a_job_of(db, f"key{i}") for i in range(9)]
+    one = a_job_of(db, "one", project="others", pair_count=200)
+    work_done = Solvers(db, solvers, 0.0)
+    work_done.run_until(180.0 / solvers)
+    total = sum(work_done.seconds.values())
+    assert work_done.seconds[one] == pytest.approx(total / 2, rel=0.1)
+    assert [work_done.seconds[job_id] for job_id in nine] == pytest.approx([total / 18] * 9, rel=0.1)
+
+
+def test_long_work_of_others_takes_no_share(db: Database) -> None:
+    """Nobody knows how long a step takes. The other project has a solver as soon as one is free, and its part of them from then on."""
+    long = {a_job_of(db, f"key{i}", pair_count=0) for i in range(9)}
+    for job_id in long:
+        a_step(db, job_id)
+    solvers = Solvers(db, 4, step_seconds=60.0)
+    solvers.run_until(30.0)
+    late = a_job_of(db, "one", project="others", pair_count=600)
+    solvers.run_until(61.0)
+    assert solvers.began[late] == 60.0, "no solver was free before"
+    before = solvers.seconds[late]
+    solvers.run_until(240.0)
+    assert solvers.seconds[late] - before == pytest.approx(2 * 180, rel=0.1), "two of the four"
+
+
+def test_a_job_gets_its_first_piece_at_once_beside_a_hundred_of_its_key(db: Database) -> None:
+    for _ in range(100):
+        a_job_of(db, "key", pair_count=20)
+    solvers = Solvers(db, 2, 0.0)
+    solvers.run_until(70.0)
+    small = a_job_of(db, "key", pair_count=1)
+    solvers.run_until(72.0)
+    assert solvers.began[small] <= 71.0
 
 
 def test_a_job_that_comes_late_neither_waits_nor_overtakes(db: Database) -> None:
@@ -138,3 +228,12 @@ def test_a_key_has_a_quota_of_unfinished_jobs(db: Database, monkeypatch: pytest.
     a_job_of(db, "a")
     with db.read() as session:
         assert session.query(JobRow).count() == 4
+
+
+def test_a_project_has_a_quota_of_unfinished_jobs_whatever_its_keys(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(settings(), "max_jobs_per_project", 2)
+    for key in ("a", "b"):
+        a_job_of(db, key)
+    with pytest.raises(CirisError, match="CIRIS_MAX_JOBS_PER_PROJECT"):
+        a_job_of(db, "c")
+    a_job_of(db, "d", project="others")
