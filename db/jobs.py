@@ -53,11 +53,11 @@ def create(
         CirisError: scene_not_found, when the scene was deleted a moment ago; idempotency_conflict, when the key was used for a
             different request; quota_exceeded, when the project or the API key has as many unfinished jobs as it may.
     """
-    job_id = str(uuid4())
+    job_id, project = str(uuid4()), _project_of(session, scene_id)
     now = clock.now(session)
     new = {
         "id": job_id,
-        "project": _project_of(session, scene_id),
+        "project": project,
         "kind": kind,
         "scene_id": scene_id,
         "options": options,
@@ -76,7 +76,7 @@ def create(
     }
     if insert_new(session, JobRow, [new]):
         if parent_id is None:
-            _check_quota(session, new["project"], key_id)
+            _check_quota(session, project, key_id)
         job = lock(session, job_id)
         labels.put(session, job_id, given_labels or {})
         events.emit(session, job, "job", {"state": job.state})

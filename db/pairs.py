@@ -164,10 +164,24 @@ def batch_length(open_pairs: int, batch_seconds: float) -> float:
 def release(session: Session, job: JobRow, lost: leases.Lost) -> list[PairRow]:
     """Opens the pairs of a lost lease and returns them. The caller holds the job's lock."""
     rows = leases.release(session, PairRow, lost)
+    _opened(job, rows)
+    return rows
+
+
+def give_back(session: Session, claim: Claim) -> None:
+    """Opens the pairs of a claim that its holder has not begun, as if they had not been claimed."""
+    job = jobs.lock(session, claim.job_id)
+    rows = session.scalars(select(PairRow).where(leases.held(PairRow, claim.token))).all()
+    transition(session, PairRow, PairState.OPEN, leases.held(PairRow, claim.token), attempts=PairRow.attempts - 1)
+    _opened(job, rows)
+    jobs.charge(session, job, -sum(row.forecast_seconds for row in rows))
+
+
+def _opened(job: JobRow, rows: Sequence[PairRow]) -> None:
+    """Counts pairs of the job as open that were running."""
     job.open_pairs += len(rows)
     job.running_pairs -= len(rows)
     job.next_pair = min([job.next_pair, *(row.id for row in rows if row.deaths == 0)])
-    return rows
 
 
 def save(session: Session, claim: Claim, results: Mapping[tuple[int, int], PairResult]) -> Saved:
@@ -179,7 +193,8 @@ def save(session: Session, claim: Claim, results: Mapping[tuple[int, int], PairR
         results: (pair index, part) -> result.
     """
     job = jobs.lock(session, claim.job_id)
-    rows = session.execute(select(PairRow.pair_index, PairRow.part, PairRow.id).where(leases.held(PairRow, claim.token)))
+    columns = (PairRow.pair_index, PairRow.part, PairRow.id, PairRow.forecast_seconds)
+    rows = session.execute(select(*columns).where(leases.held(PairRow, claim.token))).all()
     held = {(row.pair_index, row.part): row.id for row in rows}
     saved = {work: result for work, result in results.items() if work in held}
     if not saved:
@@ -190,6 +205,8 @@ def save(session: Session, claim: Claim, results: Mapping[tuple[int, int], PairR
     left = {work: (r.subtrees, r.outline) for work, r in saved.items() if r.subtrees is not None}
     subtrees.keep(session, job.id, claim.iteration, left)
     job.running_pairs -= len(saved)
+    charged = sum(row.forecast_seconds for row in rows if (row.pair_index, row.part) in saved)
+    jobs.charge(session, job, sum(result.seconds for result in saved.values()) - charged)
     job.error = next((result.error for result in saved.values() if result.error is not None), job.error)
     public = [_public(*work, result) for work, result in saved.items()]
     events.emit(session, job, "pairs", {"iteration": claim.iteration, "pairs": public})

@@ -72,6 +72,10 @@ ACCEPT = "accept"
 """The kind of the step that assembles, verifies and stores the region of a certified polytope. The job does not wait for it."""
 
 
+LEAD = "map"
+"""The kind of the step that leads the job of a map. It gives way to other jobs by itself."""
+
+
 PIECE = "piece"
 """The kind of the steps that share one round of a map (db.maps). They have no events, because there are thousands of them."""
 

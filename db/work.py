@@ -21,9 +21,9 @@ from functools import cache
 from sqlalchemy import ColumnElement, Row, Select, and_, bindparam, case, exists, func, or_, select
 from sqlalchemy.orm import Session, aliased
 
-from db import jobs, leases, pairs, steps
+from db import jobs, leases, pairs, steps, workers
 from db.models import JobRow, PairRow, StepRow
-from db.states import ACCEPT, JobState, PairState, StepState
+from db.states import ACCEPT, LEAD, PIECE, JobState, PairState, StepState
 from db.types import Utc, utcnow
 
 MOST_KEYS = 100_000
@@ -52,10 +52,7 @@ def _in_turn(session: Session, places: int, most: int) -> Sequence[str]:
     found = session.execute(_placed(), {"now": utcnow(), "places": places, "most": most}).all()
     if len(found) < 2:
         return [one.id for one in found]
-    of_key = leases.count_of_keys(session)
-    of_project: Counter[str] = Counter()
-    for (project, _), count in of_key.items():
-        of_project[project] += count
+    of_project, of_key = _held(session)
     served: dict[str, float] = {}
     for one in found:
         served[one.project] = min(one.served, served.get(one.project, math.inf))
@@ -65,6 +62,17 @@ def _in_turn(session: Session, places: int, most: int) -> Sequence[str]:
         return one.place, of_project[project], served[project], project, of_key[key], one.served, one.key_id or ""
 
     return [one.id for one in sorted(found, key=turn)]
+
+
+def others_wait(session: Session, job_id: str) -> bool:
+    """Says whether another project, or another key of the same one, has work and fewer solvers than the job's."""
+    project, key_id = session.execute(select(JobRow.project, JobRow.key_id).where(JobRow.id == job_id)).one()
+    firsts = session.execute(_placed(), {"now": utcnow(), "places": 1, "most": MOST_KEYS}).all()
+    if all((first.project, first.key_id) == (project, key_id) for first in firsts):
+        return False
+    of_project, of_key = _held(session)
+    others = {first.project for first in firsts if of_project[first.project] < of_project[project]}
+    return bool(others) or any(of_key[project, first.key_id] < of_key[project, key_id] for first in firsts if first.project == project)
 
 
 def is_there(session: Session) -> bool:
@@ -87,6 +95,29 @@ def claim(session: Session, job_id: str, *, lease_seconds: float, batch_seconds:
     if claimed is None and job.state == JobState.RUNNING:
         claimed = pairs.claim(session, job, lease_seconds=lease_seconds, batch_seconds=batch_seconds)
     return claimed
+
+
+def to_give_up(session: Session) -> leases.Lost | None:
+    """Returns the lease of a step that its holder is to give up, so that a project gets a solver within seconds; None when there is none.
+
+    That is when all solvers do steps, whose end nobody knows, and a project for which none works has work. The project that holds most
+    steps, if it holds several, gives up the one that was asked for last. No step is given up twice. Work of other kinds ends within
+    seconds, or gives way by itself.
+    """
+    long = (StepRow.state == StepState.RUNNING, StepRow.kind.not_in((LEAD, PIECE)))
+    of_project = Counter(session.scalars(select(JobRow.project).join(StepRow, StepRow.job_id == JobRow.id).where(*long)))
+    if max(of_project.values(), default=0) < 2 or of_project.total() < workers.solvers(session):
+        return None
+    firsts = session.execute(_firsts(), {"now": utcnow()})
+    waits = any(first.project not in of_project for first in firsts)
+    if not waits or leases.count_of_keys(session).total() > of_project.total():
+        return None
+    ((project, _),) = of_project.most_common(1)
+    of_it = select(StepRow).join(JobRow, JobRow.id == StepRow.job_id).where(*long, JobRow.project == project, StepRow.attempts == 1)
+    step = session.scalar(of_it.order_by(StepRow.id.desc()).limit(1))
+    if step is None:
+        return None
+    return leases.Lost(step.job_id, step.lease_token or "", step.worker or "", "another project had no solver", alone=False)
 
 
 def busy_solvers(session: Session, *, batch_seconds: float) -> int:
@@ -117,6 +148,15 @@ def served_by_now(session: Session) -> float:
     return waiting or 0.0
 
 
+def _held(session: Session) -> tuple[Counter[str], Counter[tuple[str, str | None]]]:
+    """Returns for how many leases each project, and each key, is worked for."""
+    of_key = leases.count_of_keys(session)
+    of_project: Counter[str] = Counter()
+    for (project, _), count in of_key.items():
+        of_project[project] += count
+    return of_project, of_key
+
+
 _NOW = bindparam("now", type_=Utc())
 
 
@@ -134,7 +174,7 @@ def _placed() -> Select[tuple[str, str, str | None, float, int]]:
 
 
 @cache
-def _any() -> Select[tuple[str]]:
+def _any() -> Select[str]:
     return select(JobRow.id).where(_has_work()).limit(1)
 
 

@@ -141,6 +141,12 @@ def counts(session: Session) -> dict[tuple[str, str], int]:
     return {(kind.value, state.value): 0 for kind in WorkerKind for state in WorkerState} | {(kind, state): n for kind, state, n in found}
 
 
+def solvers(session: Session) -> int:
+    """Returns how many pieces of work the workers that take work do at the same time."""
+    taking = (_lives(session), WorkerRow.kind == WorkerKind.SOLVE, WorkerRow.state == WorkerState.RUNNING)
+    return session.scalar(select(func.sum(WorkerRow.processes)).where(*taking)) or 0
+
+
 def in_trouble(session: Session) -> int:
     """Returns how many of the workers that live say that something fails."""
     return session.scalar(select(func.count()).select_from(WorkerRow).where(_lives(session), WorkerRow.trouble.is_not(None))) or 0

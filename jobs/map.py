@@ -21,12 +21,12 @@ from certifier.outcome import Outcome
 from db import jobs, maps, steps
 from db.models import JobRow
 from db.session import Database
-from db.states import ACCEPT, PIECE, JobState
+from db.states import ACCEPT, LEAD, PIECE, JobState
 from db.transaction import Afterwards
 from jobs.checks import check_positions
 from jobs.fields import model_of
 from jobs.kind import Done, Kind, Turn, report_of
-from jobs.mapping import LEAD, Account, accept, lead, piece
+from jobs.mapping import Account, accept, lead, piece
 from jobs.request import JobRequest
 from workers.app import send_work
 

@@ -35,7 +35,7 @@ from db import work as queue
 from db.models import JobRow
 from db.session import database
 from db.settings import settings
-from db.states import StepState, WorkerState
+from db.states import LEAD, StepState, WorkerState
 from db.transaction import persistently
 from jobs.kind import Done
 from jobs.scenes import load_scene
@@ -43,8 +43,6 @@ from workers.app import send_work
 
 Value = TypeVar("Value")
 
-LEAD = "map"
-"""The kind of the step that leads a job."""
 PIECE_CELLS = 512
 """A piece may look at this many cells, or it is one task."""
 NOTE_S = 2.0

@@ -16,7 +16,7 @@ from certifier.growth.options import GrowthOptions
 from certifier.jobs.pairs import CertifyPart, part_certifier
 from certifier.outcome import Outcome
 from certifier.pair.result import PairResult
-from db import jobs, leases, pairs, subtrees, traces
+from db import jobs, leases, pairs, subtrees, traces, work
 from db.models import IterationRow, PairRow
 from db.session import database
 from db.settings import settings
@@ -25,12 +25,15 @@ from db.transaction import persistently
 from jobs.failures import IN_LOG, LOST, ON_LOSS
 from jobs.former import former_of
 from jobs.scenes import load_scene
+from workers.app import send_work
 
 log = logging.getLogger(__name__)
 
 SAVE_SECONDS = 2.0
 """Results are saved together once this much time has passed since the last saving."""
-
+HELD_SECONDS = 5.0
+"""The rest of a batch is given back when others wait and this much time has passed since its first pair was done. Forecasts may be far too
+short. Before the first pair, a process may have to load the scene and the polytope."""
 
 CertifyPair = Callable[[pairs.Claim, pairs.Claimed], PairResult]
 
@@ -51,18 +54,23 @@ def _certify_and_save(claim: pairs.Claim, certify: CertifyPair) -> bool:
     """Certifies the claimed pairs and saves their results now and then. Says whether that finished the iteration."""
     results: dict[tuple[int, int], PairResult] = {}
     since = time.monotonic()
+    first_done: float | None = None
     for place, pair in enumerate(claim.pairs, start=1):
         place_of = {"iteration": claim.iteration, "pair": pair.index, "part": pair.part, "attempt": pair.attempt}
         traced = traces.span("certify", claim.traceparent, job=claim.job_id, **place_of)
         with bound_contextvars(pair=pair.index), traced as span:
             result = results[pair.index, pair.part] = certify(claim, pair)
             traces.note(span, outcome=result.outcome.value)
+        first_done = first_done or time.monotonic()
         failed = result.outcome is not Outcome.CERTIFIED
         if failed or place == len(claim.pairs) or time.monotonic() - since >= SAVE_SECONDS:
             saved = persistently(partial(_save, claim, results))
             if saved.finished or not saved.held:
                 return saved.finished
             results, since = {}, time.monotonic()
+            if since - first_done >= HELD_SECONDS and persistently(partial(_give_back, claim)):
+                send_work()
+                return False
     return False
 
 
@@ -112,6 +120,16 @@ def _left(job_id: str, iteration: int, index: int) -> list[bytes]:
             return subtrees.left_of(session, job_id, index, iteration)
 
     return persistently(read)
+
+
+def _give_back(claim: pairs.Claim) -> bool:
+    """Gives the rest of a claim back when others wait, and says whether it did."""
+    with database().read() as session:
+        if not work.others_wait(session, claim.job_id):
+            return False
+    with database().write() as session:
+        pairs.give_back(session, claim)
+    return True
 
 
 def _save(claim: pairs.Claim, results: dict[tuple[int, int], PairResult]) -> pairs.Saved:

@@ -83,8 +83,10 @@ class Holders:
 
 
 def sweep(*, by_time: bool = True) -> None:
-    """Does one round: it frees what lost workers held, wakes a solver when work has no message, and asks for due coordinations."""
+    """Does one round: it frees what lost workers held, or others need, wakes a solver when work has no message, and asks for due
+    coordinations."""
     release_lost(by_time=by_time)
+    give_way()
     with database().read() as session:
         due = jobs.awaiting_coordination(session, clock.now(session))
         is_open = work.is_there(session)
@@ -134,7 +136,19 @@ def release_lost(*, by_time: bool) -> None:
     for lease in of_pairs:
         _release(lease, pairs.release)
     for lease in of_steps:
-        _release(lease, lambda session, _job, lease: leases.release(session, StepRow, lease))
+        _release(lease, _release_step)
+
+
+def give_way() -> None:
+    """Opens a step that is to be given up. Its holder notices that within seconds, and ends itself (leases.kept)."""
+    with database().read() as session:
+        lease = work.to_give_up(session)
+    if lease is not None:
+        _release(lease, _release_step)
+
+
+def _release_step(session: Session, _job: JobRow, lease: leases.Lost) -> Sequence[StepRow]:
+    return leases.release(session, StepRow, lease)
 
 
 def _release(lease: leases.Lost, release: Callable[[Session, JobRow, leases.Lost], Sequence[PairRow] | Sequence[StepRow]]) -> None:

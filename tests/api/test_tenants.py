@@ -10,32 +10,35 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from sqlalchemy import insert
+import yaml
+from sqlalchemy import func, insert, select
 
 from certifier.errors import CirisError
 from ciris.synchronous.client import Client
-from db import keys, migrate, projects
+from db import keys, leases, migrate, projects
 from db.keys import Scope
-from db.models import ApiKeyRow
+from db.models import DEFAULT_PROJECT, ApiKeyRow, JobRow, PairRow, StepRow
 from db.session import Database
 from db.types import utcnow
 from tests.services import Postgres
 
 ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples"
 KEYS = 200_000
 REQUESTS = 500
 
 
 @contextmanager
-def a_service(data: Path, url: str) -> Iterator[str]:
-    """The URL of a whole stack on the database."""
+def a_service(data: Path, url: str, solvers: int = 1) -> Iterator[str]:
+    """The URL of a whole stack on the database, with this many solving processes."""
     clean = {name: value for name, value in os.environ.items() if not name.startswith("CIRIS_")}
-    environment = {**clean, "PYTHONPATH": str(ROOT), "CIRIS_DATABASE_URL": url, "CIRIS_SOLVE_PROCESSES": "1", "CIRIS_API_PROCESSES": "1"}
+    processes = {"CIRIS_SOLVE_PROCESSES": str(solvers), "CIRIS_API_PROCESSES": "1"}
+    environment = {**clean, "PYTHONPATH": str(ROOT), "CIRIS_DATABASE_URL": url, **processes}
     command = [sys.executable, "-m", "workers.stack", "--data", str(data), "--port", "0"]
     with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as stack:
         try:
@@ -91,3 +94,61 @@ def test_keys_of_another_project_cost_nothing(database: str, tmp_path: Path, req
     print(f"{database}, milliseconds without and with {KEYS} keys: {before} {after}")
     assert after["p50"] < 2 * before["p50"]
     assert after["p99"] < 2 * before["p99"] + 5.0
+
+
+def grow(client: Client, deadline_seconds: float) -> str:
+    """Asks for a region of the arm over the bin, whose seeding takes long."""
+    scene = client.add_scene(EXAMPLES / "ur3e_bin" / "scene.yaml")["id"]
+    q = yaml.safe_load((EXAMPLES / "ur3e_bin" / "seed.yaml").read_text())["q"]
+    job, _ = client.create_job({"kind": "grow", "scene": scene, "seed": {"q": q}, "deadline_seconds": deadline_seconds})
+    return str(job["id"])
+
+
+def solver_seconds(db: Database, project: str) -> float:
+    """The seconds of solvers that a project's steps and pairs have taken."""
+    with db.read() as session:
+        mine = (
+            select(func.sum(row.seconds)).join(JobRow, JobRow.id == row.job_id).where(JobRow.project == project)
+            for row in (StepRow, PairRow)
+        )
+        return sum(session.scalar(seconds) or 0.0 for seconds in mine)
+
+
+def held(db: Database, job_id: str) -> bool:
+    """Says whether a solver works for the job."""
+    with db.read() as session:
+        return any(leases.of_job(session, row, job_id) for row in (StepRow, PairRow))
+
+
+def until(condition: Callable[[], bool], end: float) -> None:
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+@pytest.mark.slow
+def test_nine_keys_leave_another_project_its_part(tmp_path: Path) -> None:
+    """Nine jobs of one project, each of a key of its own, run on two solvers. A job of another one has the first within seconds."""
+    url = f"sqlite:///{tmp_path / 'ciris.sqlite3'}"
+    migrate.upgrade(url)
+    db = Database(url)
+    with db.write() as session:
+        projects.add(session, "many")
+        many = [keys.add(session, f"key{i}", Scope.SUBMIT, "many") for i in range(9)]
+        one = keys.add(session, "one", Scope.SUBMIT)
+    with a_service(tmp_path / "data", url, solvers=2) as service:
+        for key in many:
+            with Client(service, key) as client:
+                grow(client, deadline_seconds=600)
+        until(lambda: solver_seconds(db, "many") > 0, time.monotonic() + 120)  # the solvers have loaded what they need
+        with Client(service, one) as client:
+            asked = time.monotonic()
+            job = grow(client, deadline_seconds=600)
+            until(lambda: held(db, job), asked + 120)
+            waited, before = time.monotonic() - asked, solver_seconds(db, "many")
+            time.sleep(60)
+        used, others = solver_seconds(db, DEFAULT_PROJECT), solver_seconds(db, "many") - before
+    db.close()
+    print(f"first piece after {waited:.1f} s; then {used:.1f} s of solvers in 60 s, the other project {others:.1f} s")
+    assert waited < 30.0
+    assert used > others / 3

@@ -11,13 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from certifier.errors import CirisError
-from db import jobs, pairs, projects, steps, work
-from db.models import DEFAULT_PROJECT, ApiKeyRow, JobRow, ProjectRow
+from db import jobs, leases, pairs, projects, steps, work, workers
+from db.models import DEFAULT_PROJECT, ApiKeyRow, JobRow, ProjectRow, StepRow
 from db.pairs import batch
 from db.session import Database
 from db.settings import settings
-from db.states import JobState, StepState
+from db.states import JobState, StepState, WorkerState
 from db.types import utcnow
+from db.workers import Made, WorkerKind
 from tests.db.builders import a_job, add_pairs, certified
 
 forecasts = st.lists(st.floats(0, 2), max_size=60)
@@ -157,6 +158,71 @@ def test_long_work_of_others_takes_no_share(db: Database) -> None:
     before = solvers.seconds[late]
     solvers.run_until(240.0)
     assert solvers.seconds[late] - before == pytest.approx(2 * 180, rel=0.1), "two of the four"
+
+
+def told(db: Database, processes: int) -> None:
+    """A worker says that it does so many pieces at the same time."""
+    made = Made("host:1:1", WorkerKind.SOLVE, "1", processes, cores=processes, memory_bytes=1)
+    with db.write() as session:
+        workers.tell(session, made, WorkerState.RUNNING)
+
+
+def claimed_step(db: Database, job_id: str) -> steps.Claim:
+    with db.write() as session:
+        claim = work.claim(session, job_id, lease_seconds=60, batch_seconds=0.5)
+    assert isinstance(claim, steps.Claim)
+    return claim
+
+
+def given_up(db: Database) -> leases.Lost | None:
+    with db.read() as session:
+        return work.to_give_up(session)
+
+
+def test_a_project_without_a_solver_gets_that_of_a_long_step(db: Database) -> None:
+    told(db, processes=2)
+    long = [a_job_of(db, f"key{i}", pair_count=0) for i in range(3)]
+    for job_id in long:
+        a_step(db, job_id)
+    first, last = claimed_step(db, long[0]), claimed_step(db, long[1])
+    assert given_up(db) is None, "nobody of another project waits"
+    other = a_job_of(db, "one", project="others", pair_count=4)
+    lost = given_up(db)
+    assert lost is not None
+    assert (lost.job_id, lost.token) == (long[1], last.token), "the one that was asked for last"
+    with db.write() as session:
+        leases.release(session, StepRow, lost)
+    assert run(db, 1) == [other]
+    assert given_up(db) is None, "a solver does pairs, which take seconds"
+    with db.write() as session:
+        assert not steps.save(session, last, StepState.DONE, {}, 1.0), "its holder can save nothing any more"
+        assert steps.save(session, first, StepState.DONE, {}, 1.0)
+
+
+def test_no_step_is_given_up_twice(db: Database) -> None:
+    told(db, processes=2)
+    long = [a_job_of(db, f"key{i}", pair_count=0) for i in range(2)]
+    for job_id in long:
+        a_step(db, job_id)
+        claimed_step(db, job_id)
+    a_job_of(db, "one", project="others", pair_count=4)
+    for _ in long:
+        lost = given_up(db)
+        assert lost is not None
+        with db.write() as session:
+            leases.release(session, StepRow, lost)
+        claimed_step(db, lost.job_id)
+    assert given_up(db) is None
+
+
+def test_a_project_keeps_the_only_solver_that_it_has(db: Database) -> None:
+    told(db, processes=2)
+    for name in ("a", "b"):
+        job_id = a_job_of(db, name, project=name, pair_count=0)
+        a_step(db, job_id)
+        claimed_step(db, job_id)
+    a_job_of(db, "one", project="others", pair_count=4)
+    assert given_up(db) is None
 
 
 def test_a_job_gets_its_first_piece_at_once_beside_a_hundred_of_its_key(db: Database) -> None:

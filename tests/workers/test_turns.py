@@ -19,14 +19,16 @@ from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.pair.forecast import forecast
 from certifier.seeding.proposal import NO_ROOM
-from db import jobs, leases, pairs, regions, retention, steps, transaction
+from db import jobs, leases, pairs, projects, regions, retention, steps, transaction, workers
 from db.models import IterationRow, JobRow, PairRow, ProofRow, StepRow, SubtreesRow
 from db.session import database
 from db.settings import settings
+from db.states import WorkerState
 from db.types import utcnow
+from db.workers import Made, WorkerKind
 from jobs import admission, growing
 from jobs.scenes import load_scene
-from tests.db.builders import add_iteration
+from tests.db.builders import a_job, add_iteration
 from tests.scenes import slider
 from tests.services import Queue
 from tests.workers.options import box_around, grow_box
@@ -76,6 +78,54 @@ def test_work_is_done_once(job_id: str) -> None:
     with environment(CIRIS_BATCH_SECONDS="1e-9"):
         assert work_all() == [Piece(job_id, False), Piece(job_id, False), Piece(job_id, True)]
     assert [(row.state, row.attempts) for row in pairs_of(job_id)] == [("certified", 1)] * 3
+
+
+def of_another_project(job_id: str) -> None:
+    with database().write() as session:
+        projects.add(session, "others")
+        session.execute(update(JobRow).where(JobRow.id == job_id).values(project="others"))
+
+
+def test_the_rest_of_a_batch_is_given_back_when_another_project_waits(job_id: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("SAVE_SECONDS", "HELD_SECONDS"):
+        monkeypatch.setattr(f"workers.pairs.{name}", 0.0)
+    other = submit(slider(posts=3), box_around([0.0], 0.1))
+    coordinate(other)
+    of_another_project(other)
+    before = job_of(job_id).served
+    assert work() == Piece(job_id, False)
+    assert [(row.state, row.attempts) for row in pairs_of(job_id)] == [("certified", 1), ("open", 0), ("open", 0)]
+    job, done = job_of(job_id), pairs_of(job_id)[0].seconds
+    assert (job.open_pairs, job.running_pairs) == (2, 0)
+    assert job.served - before == pytest.approx(done), "it is charged for what it took, whatever was forecast"
+    assert {piece.job_id for piece in work_all()} == {job_id, other}
+    assert {row.state for job in (job_id, other) for row in pairs_of(job)} == {"certified"}
+
+
+def test_a_batch_is_done_to_its_end_while_nobody_else_waits(job_id: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("SAVE_SECONDS", "HELD_SECONDS"):
+        monkeypatch.setattr(f"workers.pairs.{name}", 0.0)
+    assert work() == Piece(job_id, True)
+
+
+def test_a_long_step_is_given_up_for_another_project(job_id: str) -> None:
+    """The job of the other project has pairs. Two others seed, on the two processes that there are."""
+    of_another_project(job_id)
+    claims = []
+    with database().write() as session:
+        workers.tell(session, Made("host:1:1", WorkerKind.SOLVE, "1", 2, cores=2, memory_bytes=1), WorkerState.RUNNING)
+        for _ in range(2):
+            job = a_job(session)
+            jobs.start(session, job)
+            steps.add(session, job, "propose", {})
+            claims.append(steps.claim(session, job, accepts=False, lease_seconds=60))
+    sweeper.give_way()
+    with database().read() as session:
+        assert [row.state for row in session.scalars(select(StepRow).order_by(StepRow.id))] == ["running", "open"]
+    assert claims[1] is not None
+    lost = [event.data for event in events_of(claims[1].job_id) if event.kind == "lost"]
+    assert [(one["step"], one["reason"]) for one in lost] == [("propose", "another project had no solver")]
+    assert waiting(SOLVE) > 0
 
 
 def test_a_pair_that_failed_is_expected_to_take_as_long_the_next_time() -> None:
