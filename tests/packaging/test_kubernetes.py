@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import tempfile
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -10,9 +13,13 @@ from typing import Any
 
 import kubernetes_validate
 import pytest
+import redis
 import yaml
 
+from certifier.orphans import die_with_parent
 from db.settings import Settings
+from tests.workers.service import eventually
+from workers.processes import queue_server_command
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "deploy" / "kubernetes"
@@ -121,6 +128,45 @@ def test_workers_end_by_sigquit_and_are_looked_after() -> None:
     )
 
 
+def test_nothing_but_the_api_can_be_reached_from_outside() -> None:
+    policies = {d["metadata"]["name"]: d["spec"] for d in DOCUMENTS if d["kind"] == "NetworkPolicy"}
+    assert set(policies) == {"nothing-else", "api", "postgres", "valkey"}
+    assert policies.pop("nothing-else") == {"podSelector": {}, "policyTypes": ["Ingress"]}
+    for name, policy in policies.items():
+        assert policy["podSelector"] == {"matchLabels": PODS[name]["metadata"]["labels"]}
+        (rule,) = policy["ingress"]
+        assert [port["port"] for port in rule["ports"]] == [port["containerPort"] for port in CONTAINERS[name]["ports"]]
+        if name == "api":
+            assert "from" not in rule
+            continue
+        assert policy["policyTypes"] == ["Ingress", "Egress"]
+        ((selector,),) = ([one["podSelector"]["matchExpressions"][0]] for one in rule["from"])
+        url = {"postgres": "CIRIS_DATABASE_URL", "valkey": "CIRIS_REDIS_URL"}[name]
+        users = [of for of in OURS if any(entry["name"] == url for entry in CONTAINERS[of]["env"])]
+        assert (selector["key"], selector["operator"], selector["values"]) == ("app.kubernetes.io/name", "In", users)
+
+
+def test_valkey_asks_for_its_password() -> None:
+    """The command of the manifests, with the server of this machine."""
+    *_, script = COMPOSE["valkey"]["command"]
+    with tempfile.TemporaryDirectory(prefix="cv-", dir="/tmp") as directory:
+        here = Path(directory)
+        (server,) = queue_server_command(here / "q")[:1]
+        script = script.replace("$$", "$").replace("/tmp/", f"{here}/").replace("valkey-server /", f"{server} /")
+        script += f" --port 0 --unixsocket {here}/q --dir {here}"
+        environment = {**os.environ, "VALKEY_PASSWORD": "sesame"}
+        process = subprocess.Popen(["sh", "-c", script], env=environment, stdout=subprocess.DEVNULL, preexec_fn=die_with_parent)
+        try:
+            eventually((here / "q").exists, "the server runs", 30)
+            assert redis.Redis(unix_socket_path=str(here / "q"), password="sesame").ping()
+            with pytest.raises(redis.AuthenticationError):
+                redis.Redis(unix_socket_path=str(here / "q")).ping()
+        finally:
+            process.terminate()
+            process.wait()
+    assert not process.returncode, "the shell has become the server, which ends when it is asked to"
+
+
 def test_a_scaler_may_set_the_number_of_solve_workers() -> None:
     solve = next(d for d in DOCUMENTS if d["metadata"]["name"] == "solve")
     assert "replicas" not in solve["spec"]
@@ -139,12 +185,13 @@ def test_settings_exist_and_secrets_are_referred_to() -> None:
                 assert set(entry["valueFrom"]) == {"secretKeyRef"}
     addresses = [text for text in texts(DOCUMENTS) if "://" in text]
     assert addresses
-    assert all("@" not in text or ":$(POSTGRES_PASSWORD)@" in text for text in addresses)
+    assert all("@" not in text or re.search(r":\$\((POSTGRES|VALKEY)_PASSWORD\)@", text) for text in addresses)
+    assert all("@" in text for text in addresses if "valkey" in text or "postgres" in text), "both ask for a password"
 
 
 def test_the_example_of_a_scaler_fits_its_schema() -> None:
     blocks = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs" / "operations.md").read_text(), re.DOTALL)
-    scalers = {d["kind"]: d for block in blocks for d in yaml.safe_load_all(block)}
+    scalers = {d["kind"]: d for block in blocks for d in yaml.safe_load_all(block) if "kind" in d}
     assert set(scalers) == {"ScaledObject", "HorizontalPodAutoscaler"}
     kubernetes_validate.validate(scalers["HorizontalPodAutoscaler"], SCHEMAS, strict=True)
     assert {scaler["spec"]["scaleTargetRef"]["name"] for scaler in scalers.values()} == {"solve"}
