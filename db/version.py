@@ -64,7 +64,7 @@ def refusal(found: str | None) -> CirisError:
     elif found < known[0]:
         hint = "start version 0.1.0 of ciris on it once, then call `ciris db upgrade`"
     else:
-        hint = "install the version of ciris that migrated it, or have that version go back: `ciris db downgrade`"
+        hint = "install the version that migrated it, or have that version go back: `ciris db downgrade`"
     return CirisError("database_version", problem, field="CIRIS_DATABASE_URL", hint=hint)
 
 

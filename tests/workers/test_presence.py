@@ -159,7 +159,7 @@ def test_workers_of_another_version_end_and_say_what_to_do(crew: Service) -> Non
         assert eventually(lambda: crew.status("solve-2"), "it does not start", 60) == 2
         assert crew.log().count("this worker ends, and gives back what it holds: CIRIS_DATABASE_URL: the database is at revision 9999") == 2
         assert "error: CIRIS_DATABASE_URL: the database is at revision 9999, and this version of ciris" in crew.log()
-        assert f"works with {newest} (install the version of ciris that migrated it" in crew.log()
+        assert f"works with {newest} (install the version that migrated it" in crew.log()
     finally:
         with database().writer.begin() as connection:
             connection.execute(text(f"UPDATE alembic_version SET version_num = '{newest}'"))
