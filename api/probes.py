@@ -117,7 +117,7 @@ class Probes:
         except TimeoutError:
             return SILENT
         except (OperationalError, RedisError) as error:
-            return f"Redis cannot be reached: {error}"
+            return f"Redis cannot be reached: {type(error).__name__}"  # everybody may ask; its own words name hosts and ports
         return OK
 
     async def statistics(self) -> tuple[float, Statistics] | None:

@@ -70,9 +70,10 @@ class Settings(BaseSettings):
     data_dir: Path = Field(default_factory=_data_dir)
     """The embedded stack keeps its database, its queue, its logs and stack.json in this directory."""
     database_url: str = ""
-    """SQLAlchemy URL of the database; empty: SQLite in ``data_dir``. PostgreSQL: postgresql+psycopg://user:password@host/name."""
+    """SQLAlchemy URL of the database; empty: SQLite in ``data_dir``. PostgreSQL: postgresql+psycopg://user:password@host/name.
+    With TLS, ``?sslmode=verify-full&sslrootcert=FILE`` follows."""
     redis_url: str = ""
-    """URL of Celery's broker; empty: the embedded stack starts its own."""
+    """URL of Celery's broker; empty: the embedded stack starts its own. With TLS: rediss://:password@host:6380/0?ssl_ca_certs=FILE."""
 
     host: str = "127.0.0.1"
     """The API binds to this address. One that others can reach needs at least one API key to have been made."""

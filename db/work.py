@@ -108,7 +108,7 @@ def to_give_up(session: Session) -> leases.Lost | None:
     of_project = Counter(session.scalars(select(JobRow.project).join(StepRow, StepRow.job_id == JobRow.id).where(*long)))
     if max(of_project.values(), default=0) < 2 or of_project.total() < workers.solvers(session):
         return None
-    firsts = session.execute(_firsts(), {"now": utcnow()})
+    firsts = session.execute(_placed(), {"now": utcnow(), "places": 1, "most": MOST_KEYS}).all()
     waits = any(first.project not in of_project for first in firsts)
     if not waits or leases.count_of_keys(session).total() > of_project.total():
         return None

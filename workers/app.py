@@ -43,7 +43,7 @@ SENDING = {"max_retries": 1, "interval_start": 0, "interval_step": 0}
 @cache
 def celery_app() -> Celery:
     """Returns the application, one for the process."""
-    app = Celery("ciris", broker=settings().redis_url, set_as_current=True)
+    app = Celery("ciris", broker=_verifying(settings().redis_url), set_as_current=True)
     app.conf.update(
         task_queues=[Queue(CONTROL), Queue(SOLVE)],
         task_default_queue=CONTROL,
@@ -71,6 +71,13 @@ def celery_app() -> Celery:
         task_publish_retry_policy=SENDING,
     )
     return app
+
+
+def _verifying(url: str) -> str:
+    """Returns the URL of a queue so that TLS looks at the server's certificate, which Celery does only when the URL says so."""
+    if not url.startswith("rediss://") or "ssl_cert_reqs=" in url:
+        return url
+    return f"{url}{'&' if '?' in url else '?'}ssl_cert_reqs=required"
 
 
 def send_coordinate(job_id: str) -> bool:

@@ -29,7 +29,8 @@ def test_the_revisions_are_those_of_the_migrations() -> None:
 
 
 @pytest.mark.parametrize(
-    ("revision", "hint"), [("0001", "start version 0.1.0"), ("0025", "`ciris db upgrade`"), ("9999", "install the version that migrated it")]
+    ("revision", "hint"),
+    [("0001", "start version 0.1.0"), ("0025", "`ciris db upgrade`"), ("9999", "install the version that migrated it")],
 )
 def test_a_database_of_another_version_is_not_written(db: Database, database_url: str, revision: str, hint: str) -> None:
     put(db, revision)
