@@ -10,8 +10,9 @@ from typing import Any
 from anyio import to_thread
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
+from starlette.middleware.gzip import GZipMiddleware
 
-from api import document, guard, login, problems
+from api import delivery, document, guard, login, problems
 from api.access import Keyring
 from api.access_log import AccessLog
 from api.announce import Announcer
@@ -88,6 +89,10 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.room = Room()
     app.state.keyring = Keyring(app.state.database, open_without_keys=settings().loopback)
     app.state.announcer = Announcer()
+    app.add_middleware(delivery.Unchanged)
+    app.add_middleware(GZipMiddleware, **delivery.GZIP)
+    app.add_middleware(delivery.Head)
+    app.add_middleware(delivery.Methods)
     app.add_middleware(
         guard.Guard,
         keyring=app.state.keyring,

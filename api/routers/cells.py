@@ -9,6 +9,7 @@ from fastapi import APIRouter, Depends, Request
 from api import cells
 from api.access import READ, Db
 from api.cells import OutlinesKept
+from api.delivery import unchanging
 from api.reading import ReadingRoute
 from api.schemas.cells import Partition, RegionPairs
 from api.schemas.common import JobGiven, OfIteration, PairGiven, RegionGiven
@@ -26,6 +27,7 @@ Outlines = Annotated[OutlinesKept, Depends(_outlines)]
 
 
 @router.get("/regions/{region_id}/pairs", tags=["regions"])
+@unchanging
 def get_region_pairs(region_id: RegionGiven, db: Db, outlines: Outlines) -> RegionPairs:
     """Returns how each pair of a region is proved: by one plane or over how many cells, how far apart at least, and with which pairs."""
     with db.read() as session:
@@ -35,6 +37,7 @@ def get_region_pairs(region_id: RegionGiven, db: Db, outlines: Outlines) -> Regi
 
 
 @router.get("/regions/{region_id}/pairs/{pair}/cells", tags=["regions"])
+@unchanging
 def get_region_cells(region_id: RegionGiven, pair: PairGiven, db: Db, outlines: Outlines) -> Partition:
     """Returns the cells over which a pair of a region is proved; one cell where one plane serves on all of the region."""
     with db.read() as session:

@@ -17,6 +17,7 @@ from pydantic import Field
 from api import held, submission
 from api.access import READ, SUBMIT, Admin, Db, Submitter
 from api.announce import Announcements
+from api.delivery import unchanging
 from api.reading import ReadingRoute
 from api.room import KeptRoom
 from api.schemas.common import MAX_INT, Cursor, JobGiven, OfIteration, OfScene, PairGiven, WithDependents
@@ -329,6 +330,7 @@ def _letters(row: IterationRow, known: Mapping[int, PairState], count: int) -> I
 
 
 @router.get("/{job_id}/pairs/{pair}/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})
+@unchanging
 def download_pair_proof(
     job_id: JobGiven,
     pair: PairGiven,
@@ -347,7 +349,7 @@ def download_pair_proof(
             message = f"there is no proof of pair {pair} in iteration {iteration}"
             raise CirisError("proof_not_found", message, field="pair", hint="only pairs that are certified or refuted have one")
         data = proofs.get(session, digest)
-    headers = {"Content-Disposition": f'attachment; filename="{job.id}-{iteration}-{pair}.proof"'}
+    headers = {"Content-Disposition": f'attachment; filename="{job.id}-{iteration}-{pair}.proof"', "ETag": f'"{digest}"'}
     return Response(with_scene(data, scenes.load(db, job.scene_id)), media_type="application/octet-stream", headers=headers)
 
 

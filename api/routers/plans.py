@@ -9,6 +9,7 @@ from fastapi import APIRouter, Path, Response
 from api import plan
 from api.access import READ, Db
 from api.children import Children
+from api.delivery import unchanging
 from api.libraries import KeptLibraries
 from api.links import KeptLinks
 from api.motions import KeptMotions
@@ -33,6 +34,7 @@ async def plan_trajectory(
 
 
 @router.get("/motions/{motion_id}/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})
+@unchanging
 def download_kept_proof(
     motion_id: Annotated[str, Path(max_length=64, description="Id of a proved motion, or its first characters.", examples=[MOTION])], db: Db
 ) -> Response:
@@ -41,5 +43,5 @@ def download_kept_proof(
         motion = motions.get(session, motion_id)
         planes = proofs.get(session, motion.proof_digest)
     data = with_scene(planes, scenes.load(db, motion.scene_id))
-    headers = {"Content-Disposition": f'attachment; filename="{motion.id}.proof"'}
+    headers = {"Content-Disposition": f'attachment; filename="{motion.id}.proof"', "ETag": f'"{motion.proof_digest}"'}
     return Response(data, media_type="application/octet-stream", headers=headers)

@@ -12,6 +12,7 @@ from fastapi import APIRouter, Query, Response, status
 from api import exports
 from api.access import READ, Admin, Db
 from api.children import Children
+from api.delivery import unchanging
 from api.manifests import manifest
 from api.reading import ReadingRoute
 from api.schemas.common import MAX_INT, Cursor, Listed, OfScene, RegionGiven
@@ -64,6 +65,7 @@ def list_regions(
 
 
 @router.get("/{region_id}")
+@unchanging
 def get_region(region_id: RegionGiven, db: Db) -> RegionDetail:
     """Returns one region with its manifest."""
     with db.read() as session:
@@ -102,6 +104,7 @@ def _configurations(db: Database, region_id: str, samples: int, seed: int) -> Re
 
 
 @router.get("/{region_id}/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})
+@unchanging
 def download_region_proof(region_id: RegionGiven, db: Db) -> Response:
     """Returns the region's proof file, which `ciris verify` checks offline."""
     with db.read() as session:
@@ -141,6 +144,7 @@ def _verify(db: Database, region_id: str) -> Verification:
 @router.get(
     "/{region_id}/export", response_class=Response, responses={200: {"content": {kind: {} for kind in exports.MEDIA_TYPES.values()}}}
 )
+@unchanging
 def export_region(region_id: RegionGiven, db: Db, format: Format = ExportFormat.JSON, name: RegionName = None) -> Response:
     """Returns the region as a file for other programs.
 

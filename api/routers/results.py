@@ -8,6 +8,7 @@ from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
 from api.access import READ, Db
+from api.delivery import unchanging
 from api.reading import ReadingRoute
 from api.schemas.common import JobGiven
 from api.schemas.covers import Cover
@@ -58,6 +59,7 @@ def get_job_map(job_id: JobGiven, db: Db) -> JobMap:
 
 
 @router.get("/{job_id}/map/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})
+@unchanging
 def download_map_proof(job_id: JobGiven, db: Db) -> Response:
     """Returns the proof of the map that a job has grown, together with the scene.
 
@@ -67,10 +69,11 @@ def download_map_proof(job_id: JobGiven, db: Db) -> Response:
         job = _map_job(session, job_id)
         report, _ = _stored_map(session, job)
         data = proofs.get(session, report["proof"])
-    return _file(data, f"{job.id}.proof")
+    return _file(data, f"{job.id}.proof", report["proof"])
 
 
 @router.get("/{job_id}/map/free-set", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})
+@unchanging
 def download_free_set(job_id: JobGiven, db: Db) -> Response:
     """Returns the free set of the map that a job has grown, for lookups without the service (`ciris.FreeSet` in Python)."""
     with db.read() as session:
@@ -89,6 +92,7 @@ def get_job_motion(job_id: JobGiven, db: Db) -> JobMotion:
 
 
 @router.get("/{job_id}/motion/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})
+@unchanging
 def download_motion_proof(job_id: JobGiven, db: Db) -> Response:
     """Returns the proof of the motion that a job has certified, or of its beginning, together with the scene.
 
@@ -99,11 +103,12 @@ def download_motion_proof(job_id: JobGiven, db: Db) -> Response:
         raise CirisError("proof_not_found", "nothing is proved of this motion", field="job", hint="the contact is where it begins")
     with db.read() as session:
         data = proofs.get(session, verdict["proof"])
-    return _file(data, f"{job}.proof")
+    return _file(data, f"{job}.proof", verdict["proof"])
 
 
-def _file(data: bytes, name: str) -> Response:
-    return Response(data, media_type="application/octet-stream", headers={"Content-Disposition": f'attachment; filename="{name}"'})
+def _file(data: bytes, name: str, digest: str | None = None) -> Response:
+    headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+    return Response(data, media_type="application/octet-stream", headers=headers | ({"ETag": f'"{digest}"'} if digest else {}))
 
 
 def _ended(job: JobRow) -> dict[str, Any]:

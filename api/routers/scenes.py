@@ -13,6 +13,7 @@ from fastapi import APIRouter, File, Path, Query, Response, UploadFile, status
 from api import drawing
 from api.access import READ, Admin, Db, Submitter
 from api.children import Children
+from api.delivery import unchanging
 from api.reading import ReadingRoute
 from api.room import KeptRoom, Room
 from api.schemas.common import Cursor, Listed, SceneGiven, WithDependents
@@ -111,6 +112,7 @@ def list_scenes(db: Db, after: Cursor = None, limit: Listed = 100) -> ScenePage:
 
 
 @router.get("/{scene_id}")
+@unchanging
 def get_scene(scene_id: SceneGiven, db: Db) -> SceneDetail:
     """Returns one scene, by its id or by its name. A name means the scene that was last added under it or promoted."""
     with db.read() as session:
@@ -121,6 +123,7 @@ def get_scene(scene_id: SceneGiven, db: Db) -> SceneDetail:
 
 
 @router.get("/{scene_id}/model")
+@unchanging
 def get_scene_model(scene_id: SceneGiven, db: Db) -> SceneModel:
     """Returns the scene as it is drawn: its kinematic tree, and the convex bodies that are certified."""
     with db.read() as session:
@@ -129,6 +132,7 @@ def get_scene_model(scene_id: SceneGiven, db: Db) -> SceneModel:
 
 
 @router.get("/{scene_id}/pairs")
+@unchanging
 def get_scene_pairs(scene_id: SceneGiven, db: Db) -> ScenePairs:
     """Returns the pairs to certify, with the reference frame chosen for each pair and a forecast of its cost."""
     with db.read() as session:
@@ -144,6 +148,7 @@ def get_scene_pairs(scene_id: SceneGiven, db: Db) -> ScenePairs:
 
 
 @router.get("/{scene_id}/lint")
+@unchanging
 def get_scene_lint(scene_id: SceneGiven, db: Db) -> LintReport:
     """Returns what a reader should know about the scene before trusting a certificate for it."""
     with db.read() as session:
