@@ -20,6 +20,12 @@ NEVER_THE_SAME = {"/metrics"}
 """Their answer counts the requests before it."""
 
 
+@pytest.fixture(autouse=True)
+def often(environment: pytest.MonkeyPatch) -> None:
+    """These tests ask more often than a client may."""
+    environment.setenv("CIRIS_REQUESTS_PER_SECOND", "10000")
+
+
 @pytest.fixture
 def things(client: TestClient, region: str, busy: str) -> dict[str, str]:
     """Values for what stands in braces in the addresses of the document."""
