@@ -151,6 +151,7 @@ def _of_rows(age: float, statistics: Statistics) -> list[str]:
     return [
         _family("ciris_statistics_age_seconds", "gauge", "Time since the rows of the database were counted.", {(): age}),
         _family("ciris_jobs", "gauge", "Jobs by state.", _by("state", statistics.jobs)),
+        _family("ciris_jobs_ended", "gauge", "Stored jobs that have ended, by project and how.", _ended(statistics)),
         _family("ciris_pairs", "gauge", "Pairs by state; the settled ones by outcome.", _by("state", statistics.pairs)),
         _family("ciris_pair_seconds", "gauge", "Time spent on the stored pairs, by state.", _by("state", statistics.pair_seconds)),
         _family("ciris_step_seconds", "gauge", "Time spent on the stored steps, by kind.", _by("kind", statistics.step_seconds)),
@@ -163,6 +164,10 @@ def _of_rows(age: float, statistics: Statistics) -> list[str]:
         _family("ciris_open_pieces", "gauge", "Pieces that wait, of iterations begun longer ago than.", _ages(statistics)),
         _family("ciris_oldest_open_piece_seconds", "gauge", "Age of what waits longest.", {(): max(statistics.waiting, default=0.0)}),
     ]
+
+
+def _ended(statistics: Statistics) -> Samples:
+    return {(("project", project), ("end", end)): count for (project, end), count in statistics.ended.items()}
 
 
 def _ages(statistics: Statistics) -> Samples:

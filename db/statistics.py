@@ -2,15 +2,48 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
+from enum import StrEnum
 
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
+from certifier.growth.refusal import DEADLINE
 from db import clock, jobs, work, workers
-from db.models import IterationRow, JobRow, PairRow, RegionRow, StepRow, WebhookRow
+from db.models import IterationRow, JobRow, PairRow, ProjectRow, RegionRow, StepRow, WebhookRow
 from db.settings import settings
-from db.states import ACCEPT, JobState, PairState, WebhookState
+from db.states import ACCEPT, JOB, JobState, PairState, WebhookState, unfinished
+
+
+class End(StrEnum):
+    """Says how a job ended."""
+
+    SUCCEEDED = "succeeded"
+    CANCELLED = "cancelled"
+    DEADLINE = "deadline"
+    """It failed because its deadline came first."""
+    REFUSED = "refused"
+    """It failed because what it asked for cannot be done or was not found; its error says why."""
+    ERROR = "error"
+    """It failed by a fault: of the program, or of a process that died."""
+
+
+FAULTS = frozenset(
+    {
+        "child_died",
+        "child_memory",
+        "child_timeout",
+        "coordination_failed",
+        "internal_error",
+        "other_version",
+        "solver_unavailable",
+        "worker_lost",
+    }
+)
+"""Errors with these codes are no fault of the caller."""
+PROJECTS, OTHER = 50, "(others)"
+"""This many projects are counted by themselves, the oldest ones. The others are counted together, so that their number is no burden."""
 
 
 @dataclass(frozen=True)
@@ -18,6 +51,7 @@ class Statistics:
     """Holds the number of rows by state. A state that no row is in counts zero.
 
     Attributes:
+        ended: (project, how they ended) -> stored jobs. At most ``PROJECTS`` projects have a name of their own here.
         pair_seconds: seconds spent on pairs, summed by the state that resulted.
         step_seconds: seconds spent on steps, summed by kind.
         decisions_due: jobs for which a decision of a control worker is due that nobody makes.
@@ -28,6 +62,7 @@ class Statistics:
     """
 
     jobs: dict[str, int]
+    ended: dict[tuple[str, End], int]
     pairs: dict[str, int]
     pair_seconds: dict[str, float]
     step_seconds: dict[str, float]
@@ -57,6 +92,7 @@ def collect(session: Session) -> Statistics:
     seconds = {state: total for state, _, total in pairs}
     return Statistics(
         jobs={state: states.get(state, 0) for state in JobState},
+        ended=_ended(session),
         pairs={state: counted.get(state, 0) for state in PairState},
         pair_seconds={state: seconds.get(state) or 0.0 for state in PairState},
         step_seconds={kind: total or 0.0 for kind, total in sorted(({ACCEPT: 0.0} | steps).items())},
@@ -68,3 +104,21 @@ def collect(session: Session) -> Statistics:
         workers_in_trouble=workers.in_trouble(session),
         workers_wanted=work.busy_solvers(session, batch_seconds=settings().batch_seconds),
     )
+
+
+def _ended(session: Session) -> dict[tuple[str, End], int]:
+    oldest = session.scalars(select(ProjectRow.name).order_by(ProjectRow.created_at, ProjectRow.name).limit(PROJECTS)).all()
+    counts = Counter({(project, end): 0 for project in oldest for end in End})
+    columns = (JobRow.project, JobRow.state, JobRow.reason.startswith(DEADLINE), JobRow.error["code"].as_string())
+    ended = select(*columns, func.count()).where(JobRow.state.not_in(unfinished(JOB))).group_by(*columns)
+    for project, state, late, code, number in session.execute(ended):
+        counts[project if project in oldest else OTHER, _end(state, late, code or "")] += number
+    return dict(counts)
+
+
+def _end(state: str, late: bool | None, code: str) -> End:
+    if state != JobState.FAILED:
+        return End(state)
+    if code in FAULTS or code.startswith("proof"):
+        return End.ERROR
+    return End.DEADLINE if late else End.REFUSED
