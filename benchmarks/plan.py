@@ -21,6 +21,7 @@ from certifier.model import Array, Scene
 from certifier.motion.bodies import bodies_of
 from certifier.pair.collisions import in_collision
 from certifier.scene import load_scene
+from certifier.verify.file import verify_file
 from ciris.answers import Plan
 from ciris.synchronous.service import Service
 from client import service
@@ -36,7 +37,9 @@ NARROW = {"iiwa_gripper": {"shelf": ((0.72, -0.28, 0.06), (0.9, 0.28, 0.86)), "b
 TASKS = 10
 AGAIN = 200
 """Number of the last random questions that are asked again."""
-DRAWN = 50_000
+DRAWN, AT_ONCE = 50_000, 500
+NEAR = 0.4
+"""With conditions, a motion ends within this of its beginning in each joint, in radians or metres. What keeps them has many components."""
 
 
 def motions(name: str, url: str | None, queries: int, points: int, progress: Progress) -> dict[str, Any]:
@@ -45,16 +48,15 @@ def motions(name: str, url: str | None, queries: int, points: int, progress: Pro
     Args:
         name: an example, or a scene file.
         url: of a running service; None for the one that is found. It answers from what it has of the scene.
-        points: at how many points Drake looks at each motion.
+        points: at how many points Drake looks at each motion, and our pairs at conditions.
 
     Raises:
-        CirisError: what is wrong with the scene or the service.
+        CirisError: what is wrong with the scene or the service, or a proof that does not hold.
     """
     file = name if is_scene_file(name) else str(catalogue.FILES[name])
     scene, rng = load_scene(file), np.random.default_rng(0)
     rival = Ompl(scene)
-    free = scene.to_q(free_samples(scene, partial(in_collision, scene), 2 * queries, rng))
-    pairs = list(zip(free[:queries], free[queries:], strict=True))
+    pairs = _questions(scene, queries, rng)
     narrow = _tasks(scene, name, rng)
     with service.connect(url) as client:
         asked = Service(client)
@@ -83,6 +85,25 @@ def motions(name: str, url: str | None, queries: int, points: int, progress: Pro
     }
 
 
+def _questions(scene: Scene, count: int, rng: np.random.Generator) -> list[tuple[Array, Array]]:
+    """Returns pairs of random free configurations: uniform among all, or, with conditions, within NEAR of each other."""
+    drawn = count if scene.conditions else 2 * count
+    free = scene.to_q(free_samples(scene, partial(in_collision, scene), drawn, rng))
+    if not scene.conditions:
+        return list(zip(free[:count], free[count:], strict=True))
+    return [(start, _near(scene, start, rng)) for start in free]
+
+
+def _near(scene: Scene, start: Array, rng: np.random.Generator) -> Array:
+    """Returns a free configuration, (n,), uniform among those within NEAR of a free one in each joint."""
+    lower, upper = np.maximum(scene.q_lower, start - NEAR), np.minimum(scene.q_upper, start + NEAR)
+    while True:
+        q = rng.uniform(lower, upper, (AT_ONCE, scene.n))
+        free = q[~in_collision(scene, scene.to_s(q))]
+        if len(free):
+            return np.asarray(free[0])
+
+
 def _tasks(scene: Scene, name: str, rng: np.random.Generator) -> list[tuple[Array, Array]]:
     """Returns pairs of free configurations in narrow places, from each place to the next; none for a scene without tasks."""
     if name not in NARROW:
@@ -103,10 +124,16 @@ def _tasks(scene: Scene, name: str, rng: np.random.Generator) -> list[tuple[Arra
 def _row(scene: Scene, rival: Ompl, ask: Any, pair: tuple[Array, Array], points: int, progress: Progress, number: int) -> dict[str, Any]:
     """Returns what both planners make of one question, each in its turn."""
     found, seconds = _timed(ask, pair)
+    proof = ask(*pair, seconds=SECONDS, prove=True).proof if found else None
     path, theirs = rival.plan(*pair, SECONDS)
     row: dict[str, Any] = {
         "straight": float(np.linalg.norm(pair[1] - pair[0])),
-        "ours": {"seconds": seconds, "reason": found.reason, **_path(rival, found.q if found else None, points)},
+        "ours": {
+            "seconds": seconds,
+            "reason": found.reason,
+            "proved": proof is not None and verify_file(proof).scene.hash == scene.hash,
+            **_path(rival, found.q if found else None, points),
+        },
         "ompl": {"seconds": theirs, **_path(rival, path, points)},
     }
     progress(f"{scene.name} {number}: {_said(row['ours'])}; OMPL {_said(row['ompl'])}")
@@ -125,8 +152,8 @@ def _timed(ask: Any, pair: tuple[Array, Array]) -> tuple[Plan, float]:
 
 def _path(rival: Ompl, path: Array | None, points: int) -> dict[str, Any]:
     if path is None:
-        return {"length": None, "collides": None}
-    return {"length": float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()), "collides": rival.collides(path, points)}
+        return {"length": None, "fails": None}
+    return {"length": float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()), "fails": rival.fails(path, points)}
 
 
 def _compared(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -138,6 +165,7 @@ def _compared(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "ompl_solved": len(solved),
         "answered_of_these": len(both),
         "answered": sum(row["ours"]["length"] is not None for row in rows),
+        "proved": sum(row["ours"]["proved"] for row in rows),
         "length_ratio": _quantiles([row["ours"]["length"] / row["ompl"]["length"] for row in both]),
         **{side: _summary([row[side] for row in rows]) for side in ("ours", "ompl")},
     }
@@ -145,7 +173,7 @@ def _compared(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 def _summary(found: list[dict[str, Any]]) -> dict[str, Any]:
     return {
-        "collide": sum(each["collides"] is True for each in found),
+        "fail": sum(each["fails"] is True for each in found),
         "seconds": _quantiles([each["seconds"] for each in found]),
         "length": _quantiles([each["length"] for each in found if each["length"] is not None]),
     }

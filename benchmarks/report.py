@@ -320,17 +320,20 @@ def _query(document: Document) -> list[str]:
 
 def _plan(document: Document) -> list[str]:
     """Returns a table of both planners, and sentences about lengths, repeated questions and tasks in narrow places."""
-    header = ["planner", "answered", "p50, s", "p99, s", "length, p50", "collide"]
+    header = ["planner", "answered", "proved", "p50, s", "p99, s", "length, p50", "fail"]
     parts = [("random questions", document), *([("tasks in narrow places", document["tasks"])] if document["tasks"] else [])]
     about = f"{document['scene']}: {document['joints']} joints, {document['pairs']} pairs"
     said = [f"{about}; the first motion took {document['first_seconds']:.2f} s."]
     for what, part in parts:
         rows = []
-        for name, side, answered in (("ciris plan", "ours", part["answered"]), ("OMPL, no proof", "ompl", part["ompl_solved"])):
+        for name, side, answered, proved in (
+            ("ciris plan", "ours", part["answered"], str(part["proved"])),
+            ("OMPL, no proof", "ompl", part["ompl_solved"], "-"),
+        ):
             found = part[side]
             times = [f"{found['seconds'][which]:.3f}" for which in ("p50", "p99")]
             length = f"{found['length']['p50']:.2f}" if found["length"] else "-"
-            rows.append([name, f"{answered} of {part['asked']}", *times, length, str(found["collide"])])
+            rows.append([name, f"{answered} of {part['asked']}", proved, *times, length, str(found["fail"])])
         ratio = part["length_ratio"]
         solved = f"{part['answered_of_these']} of {part['ompl_solved']}"
         said += [f"{what}:", _table(header, rows), f"Of those that OMPL solved, we answered {solved}."]

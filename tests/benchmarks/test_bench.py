@@ -11,11 +11,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
-from benchmarks import agreement, catalogue, compare, growth, maps, path, query, recertify, report, service, store, survey
+from benchmarks import agreement, catalogue, compare, growth, maps, path, plan, query, recertify, report, service, store, survey
 from benchmarks.compare import Verdict, verdict
 from benchmarks.ompl import Ompl
 from certifier.carry.robot import same_bodies
+from certifier.conditioned import without_conditions
+from certifier.conditions import Cone
 from certifier.errors import CirisError
 from certifier.growth.paper.options import PaperOptions
 from certifier.kinematics import Kinematics
@@ -28,6 +31,8 @@ from certifier.verify.scene import check_scene
 from tests.client.conftest import surroundings
 from tests.docs.test_quickstart import service as service_of
 from tests.services import Postgres
+
+CUP = catalogue.ROOT / "examples/ur3e_cup/scene.yaml"
 
 
 def bench(*arguments: str) -> dict[str, Any]:
@@ -273,18 +278,33 @@ def test_motions_are_planned_beside_ompl(tmp_path: Path) -> None:
     with service_of(environment, tmp_path):
         url = json.loads((tmp_path / "data" / "stack.json").read_text())["url"]
         document = bench("plan", "planar_2dof", "--url", url, "--queries", "12", "--points", "500")
+        conditioned = bench("plan", str(CUP), "--url", url, "--queries", "3", "--points", "100")
     assert document["asked"] == len(document["rows"]) == document["answered"] == 11
     assert document["answered_of_these"] == document["ompl_solved"]
-    assert document["ours"]["collide"] == 0
+    assert document["proved"] == 11
+    assert document["ours"]["fail"] == 0
     for row in document["rows"]:
         assert row["ours"]["length"] >= row["straight"] * (1 - 1e-9)
+    assert all(row["straight"] <= plan.NEAR * 6**0.5 for row in conditioned["rows"])
+    assert conditioned["proved"] == conditioned["answered"] == conditioned["ompl_solved"] == 2
     assert "OMPL, no proof" in report.text(document)
 
 
-def test_the_check_of_a_path_finds_what_collides() -> None:
+def test_the_check_of_a_path_finds_what_fails() -> None:
     rival = Ompl(catalogue.scene("planar_2dof"))
-    assert rival.collides(np.array([[0.0, 0.0], [1.72, -2.1]]), 500)
-    assert not rival.collides(np.array([[0.0, 0.0], [0.1, -0.1]]), 500)
+    assert rival.fails(np.array([[0.0, 0.0], [1.72, -2.1]]), 500)
+    assert not rival.fails(np.array([[0.0, 0.0], [0.1, -0.1]]), 500)
+
+
+def test_the_check_of_a_path_finds_conditions_that_are_not_kept() -> None:
+    scene = load_scene(CUP)
+    q = np.array(yaml.safe_load((CUP.parent / "seed.yaml").read_text())["q"])
+    upright, rival = scene.conditions[0], Ompl(scene)
+    assert isinstance(upright, Cone)
+    tilted = q + upright.angle * 1.1 * np.eye(6)[3]
+    assert not rival.fails(np.array([q, q + 0.8 * (tilted - q)]), 20)
+    assert rival.fails(np.array([q, tilted]), 20)
+    assert not Ompl(without_conditions(scene)).fails(np.array([q, tilted]), 20)
 
 
 def test_the_page_shows_the_figures_that_lie_beside_it() -> None:
