@@ -316,6 +316,18 @@ def _slab(normal: Array, begin: float, depth: float, lateral: float) -> Array:
     return np.outer(begin + depth * x, normal) + lateral * (np.outer(y, across[0]) + np.outer(z, across[1]))
 
 
+def limit_of(geometry: Geometry) -> Array | None:
+    """Returns the plane, (4,), that has what a condition allows on its positive side: x is allowed where plane @ [x, 1] >= 0, in metres.
+
+    It is the face of a box of what the condition does not allow, in the frame of its body; None for any other geometry.
+    """
+    if not of_condition(geometry.name) or len(geometry.vertices) != len(CORNERS):
+        return None
+    near, far = geometry.vertices[:4].mean(axis=0), geometry.vertices[4:].mean(axis=0)
+    normal = _unit(near - far)
+    return np.array([*normal, -normal @ near])
+
+
 def _unit(vector: Iterable[float]) -> Array:
     array = np.array(list(vector), dtype=float)
     return np.asarray(array / np.linalg.norm(array))

@@ -9,13 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from certifier.conditioned import limit_of
 from certifier.model import Array, Volume
 from certifier.partition import planes
 from certifier.partition.area import Area
 from certifier.partition.cell import Cell
 from certifier.partition.chords import chords, within
 from certifier.partition.hulls import Hull, approach, gaps, hull
-from certifier.partition.multipliers import PROVED
+from certifier.partition.multipliers import PROVED, REFUTED
 from certifier.partition.sides import Moving, Proofs, Side, prove_side, room_for
 from certifier.partition.tree import Streams, joined
 
@@ -35,6 +36,8 @@ configurations."""
 PIECES, MANY_PIECES = 25, 250
 """A vertex may take this many pieces: PIECES with up to 5 joints between the bodies, MANY_PIECES with more."""
 FEW_JOINTS = 5
+BESIDE = 1e-6
+"""The plane of a condition's limit is moved by this part of the bodies' extent to what is allowed, so that there is room on both sides."""
 DESCENT = 8
 """Number of steps in which a vertex is moved to where it is farther on the wrong side."""
 CLOSE = 0.05
@@ -124,6 +127,23 @@ class Bodies:
         pieces = PIECES if len(self.joints) <= FEW_JOINTS else MANY_PIECES
         first, second = (side.moving for side in self._sides)
         self.pair = Pair(a, b, first, second, np.array(self.joints, np.int64), middle, self.extent, max(radii) > 0, pieces)
+        self._known = self._known_plane(frame)
+
+    def _known_plane(self, frame: str) -> Array | None:
+        """Returns the plane, (4, 1 + k), of the limit of a condition that stands still in the frame of the plane, if one volume is its box.
+
+        No other plane separates more: the box reaches beyond all that the other volume can get to.
+        """
+        for volume, sign in zip(self.volumes, (-1.0, 1.0), strict=True):
+            limit = limit_of(self._area.scene.geometry(volume.geometries[0]))
+            if limit is None or not volume.is_geometry_of(self._area.scene) or self._area.kinematics.chain(frame, volume.body):
+                continue
+            (X,) = self._area.kinematics.points(frame, volume.body, np.array([[0.0, 0.0, 0.0], limit[:3]]), self._area.samples[:1])
+            normal = X[1] - X[0]
+            plane = np.zeros((4, 1 + len(self.joints)))
+            plane[:3, 0], plane[3, 0] = sign * normal, sign * (limit[3] - normal @ X[0] - BESIDE * self.extent)
+            return plane
+        return None
 
     def separate(self, cell: Cell, start: Array) -> Separated | Undecided:
         """Looks for a plane on the polytope and a cell, and proves it.
@@ -131,6 +151,8 @@ class Bodies:
         Args:
             start: (n,) a point of the polytope in the cell.
         """
+        if self._known is not None:
+            return self._prove(cell, start, self._known)
         kind, plane, proofs, first, X, places, weights = _separate(
             self.pair, cell.lower, cell.upper, *self._inside(cell), start, cell.points, cell.seed, LEAST / self._area.finer
         )
@@ -139,6 +161,18 @@ class Bodies:
         if kind == NO_PLANE:
             return Undecided(X, X[places], weights)
         return Undecided(X, None, weights, None if kind == UNPROVED else -1 - kind)
+
+    def _prove(self, cell: Cell, start: Array, plane: Array) -> Separated | Undecided:
+        """Proves a plane (4, 1 + k) than which no other one can do more; all else is as for :meth:`separate`."""
+        C, d, *cut = self._inside(cell)
+        kind, bounded, proofs, first, refuted = _held_by(self.pair, cell.lower, cell.upper, *cut, plane)
+        if kind == PROVED:
+            return Separated(bounded, _streams(proofs, first))
+        X, N = _configurations(self.pair.joints, cell.lower, cell.upper, C, d, start, cell.points, cell.seed)
+        if kind != REFUTED:
+            return Undecided(X[:N].copy(), None, np.zeros(0), -1 - kind)
+        X[N] = within(C, d, start, refuted)
+        return Undecided(X[: N + 1].copy(), X[N : N + 1].copy(), np.ones(1))
 
     def held_by(self, cell: Cell, plane: Array, play: Sequence[int]) -> Separated | None:
         """Returns the proof that a given plane separates the bodies on the polytope and a cell; None where it cannot be proved.
@@ -150,7 +184,8 @@ class Bodies:
         own = [0, *(1 + play.index(joint) for joint in self.joints)]
         if np.delete(plane, own, axis=1).any():
             return None  # It moves with joints that move neither body.
-        kind, plane, proofs, first = _held_by(self.pair, cell.lower, cell.upper, *self._inside(cell), np.ascontiguousarray(plane[:, own]))
+        cut = self._inside(cell)[2:]
+        kind, plane, proofs, first, _ = _held_by(self.pair, cell.lower, cell.upper, *cut, np.ascontiguousarray(plane[:, own]))
         return Separated(plane, _streams(proofs, first)) if kind == PROVED else None
 
     def _inside(self, cell: Cell) -> tuple[Array, Array, Array, Array, Array]:
@@ -260,13 +295,19 @@ def _separate(
 
 @njit(cache=True)
 def _held_by(
-    pair: Pair, lower: Array, upper: Array, C: Array, d: Array, cutting: Array, offsets: Array, faces: Array, plane: Array
-) -> tuple[int, Array, Proofs, Array]:
-    """Proves a plane (4, 1 + k) as a proof holds it on the polytope and a cell. The arguments are those of :func:`_separate`."""
+    pair: Pair, lower: Array, upper: Array, cutting: Array, offsets: Array, faces: Array, plane: Array
+) -> tuple[int, Array, Proofs, Array, Array]:
+    """Proves a plane (4, 1 + k) as a proof holds it on the polytope and a cell. The arguments are those of :func:`_separate`.
+
+    Returns:
+        What :func:`prove_both` finds, the plane with a bound of its normal's length, the proofs of both sides, the lengths of the first
+        one's, and where the plane is refuted.
+    """
     first, refuted = np.zeros(3, np.int64), np.empty(len(lower))
     proofs = room_for(len(pair.first.vertices) + len(pair.second.vertices), pair.pieces)
     bounded = _bounded(pair, lower, upper, plane)
-    return prove_both(pair, bounded, lower, upper, cutting, offsets, faces, proofs, first, refuted), bounded, proofs, first
+    kind = prove_both(pair, bounded, lower, upper, cutting, offsets, faces, proofs, first, refuted)
+    return kind, bounded, proofs, first, refuted
 
 
 @njit(cache=True, inline="always")

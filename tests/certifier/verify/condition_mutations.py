@@ -8,6 +8,7 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -100,7 +101,7 @@ def motion(tube: bool) -> bytes:
 
 @cache
 def mapped() -> bytes:
-    return grow_map(scene(), 0.5, 30.0).proof.to_bytes()
+    return grow_map(scene(), 0.5, 600.0).proof.to_bytes()
 
 
 def valid(kind: str) -> list[bytes]:
@@ -136,7 +137,8 @@ class Parts:
         self.header["scene"] = json.loads(json.dumps(document))
 
     def without_pair(self, i: int) -> None:
-        """Drops what proves the pair with this number."""
+        """Drops a pair with this number, and what proves it."""
+        pair = self.scene["pairs"].pop(i)
         if "counts" in self.arrays:
             totals = self.arrays["counts"].sum(axis=1)
             rows = slice(int(totals[:i].sum()), int(totals[: i + 1].sum()))
@@ -144,7 +146,9 @@ class Parts:
             self.arrays |= {name: np.ascontiguousarray(np.delete(self.arrays[name], i, axis=0)) for name in ("counts", "frames")}
             return
         known, prefix = ("proofs", "proof") if "proofs" in self.header else ("pairs", "map")
-        del self.header[known][i]
+        if prefix == "map":  # a tree may stand for several pairs
+            i = next((number for number, alike in enumerate(self.header["pairs"]) if pair[:2] in alike), len(self.header["pairs"]))
+        del self.header[known][i : i + 1]
         kept = {}
         for name, array in self.arrays.items():
             first, *rest = name.split("/")
@@ -239,10 +243,10 @@ def pairs(parts: Parts, rng: Rng) -> None:
     known = parts.scene["pairs"]
     own = [i for i, pair in enumerate(known) if len(pair) == 3 or any(map(of_condition, pair[:2]))]
     i, way = int(chosen(rng, own)), rng.integers(5)
-    if way <= 1:
+    if way == 0:
         del known[i]
-        if way:
-            parts.without_pair(i)
+    elif way == 1:
+        parts.without_pair(i)
     elif way == 2:
         j = int(chosen(rng, own))
         known[i], known[j] = known[j], known[i]
@@ -315,8 +319,10 @@ def changed(data: bytes, rng: Rng) -> tuple[str, bytes]:
     parts = Parts(data)
     kinds = [chosen(rng, KINDS) for _ in range(1 + int(rng.random() < 0.25))]
     name = kinds[0].__name__
-    for kind in kinds:
-        kind(parts, rng)
+    kinds[0](parts, rng)
+    for kind in kinds[1:]:
+        with suppress(TypeError, KeyError, ValueError, AttributeError):  # what is no condition any more stays as it is
+            kind(parts, rng)
     if kinds[-1] in AGAIN and rng.random() < 0.6:
         parts.made_again()
         name += ", made again"

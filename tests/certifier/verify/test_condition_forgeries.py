@@ -38,9 +38,7 @@ def named_without_pairs(parts: Parts) -> None:
 
 
 def pairs_dropped(parts: Parts) -> None:
-    i = next(i for i, pair in enumerate(parts.scene["pairs"]) if "conditions/lean/direction" in pair)
-    del parts.scene["pairs"][i]
-    parts.without_pair(i)
+    parts.without_pair(next(i for i, pair in enumerate(parts.scene["pairs"]) if "conditions/lean/direction" in pair))
 
 
 def padding_dropped(parts: Parts) -> None:
