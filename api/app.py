@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import AsyncIterator, MutableMapping
 from contextlib import asynccontextmanager
 from functools import partial
@@ -46,9 +47,12 @@ from api.routers import (
     workers,
 )
 from api.writing import WRITERS
+from certifier.isolation.confinement import probed
 from certifier.scene.bundle import expect_bundles
 from db.session import CONNECTIONS, Database, database
 from db.settings import LOOPBACK_NAMES, settings
+
+log = logging.getLogger(__name__)
 
 DESCRIPTION = """Certified collision-free regions of robot configuration space.
 
@@ -113,8 +117,12 @@ def create_app(db: Database | None = None) -> FastAPI:
 
 @asynccontextmanager
 async def _lifespan(_app: FastAPI) -> AsyncIterator[None]:
-    """Limits the threads that answer requests. Each has its connection to the database, so more threads would only wait for each other."""
+    """Limits the threads that answer requests, and says how uploads are read.
+
+    Each thread has its connection to the database, so more threads would only wait for each other.
+    """
     to_thread.current_default_thread_limiter().total_tokens = THREADS
+    log.info("uploads are read with: %s", await to_thread.run_sync(probed))
     expect_bundles()
     yield
 

@@ -12,7 +12,7 @@ from fastapi import APIRouter, File, Path, Query, Response, UploadFile, status
 
 from api import drawing
 from api.access import READ, Admin, Db, Submitter
-from api.children import Children
+from api.children import AT_ONCE, Children
 from api.delivery import unchanging
 from api.reading import ReadingRoute
 from api.room import KeptRoom, Room
@@ -35,10 +35,10 @@ from api.writing import writing
 from certifier.model import Scene
 from certifier.names import MAX_NAME
 from certifier.pair.forecast import forecast
-from certifier.scene.bundle import load_bundle
+from certifier.scene.bundle import BundleLimits, load_bundle
 from certifier.scene.conditions import constrained, read_conditions, swept_in
 from certifier.verify import uncovered
-from db import audit, retention, scenes, staging
+from db import audit, machine, retention, scenes, staging
 from db.audit import Action
 from db.session import Database
 
@@ -99,7 +99,9 @@ def _add_scene(db: Database, room: Room, project: str, file: BinaryIO, stage: st
 @cached(LRUCache(KEPT), key=lambda data: hashlib.sha256(data).digest(), lock=Lock())
 def _read(data: bytes) -> Scene:
     """Returns the scene in a bundle. Equal bundles hold equal scenes, and a child process reads each once."""
-    return load_bundle(data)
+    most = BundleLimits()
+    memory = min(most.memory_bytes, machine.memory_bytes() // (AT_ONCE + 1))
+    return load_bundle(data, replace(most, memory_bytes=memory))
 
 
 @router.get("")

@@ -9,6 +9,7 @@ prints goes to a log, whose tail explains a death.
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import signal
@@ -18,11 +19,13 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import asdict
 from multiprocessing.connection import Pipe
 from pathlib import Path
 from typing import Any
 
 from certifier.errors import CirisError, RegionError, SceneError
+from certifier.isolation.confinement import Confinement, alone, clean
 
 ERRORS = {cls.__name__: cls for cls in (CirisError, SceneError, RegionError)}
 LOADED = b"loaded"
@@ -60,6 +63,7 @@ def run_in_child(
     kept: tuple[str, str] | None = None,
     fork: bool = True,
     tell: Tell | None = None,
+    confinement: Confinement | None = None,
 ) -> Any:
     """Returns ``function(payload)``, computed by a child process that is killed when it takes too long or outlives this process.
 
@@ -73,14 +77,22 @@ def run_in_child(
         fork: whether a fork of the nursery computes it. The nursery itself takes half the time where a call takes some milliseconds, and
             what it has read of one call may be seen by the next. If it dies, the next call waits until another one has loaded the module.
         tell: hears every TELL_S seconds, and when the time is up, what the function has told by then: for each name what came last.
+        confinement: which files a fork may reach; None: those that this process can reach. It never has a network, or variables of the
+            environment that it does not need.
+
+    In a child that may start no process, the function is called there.
 
     Raises:
         CirisError: the function's own error, of the class it was raised with; or ``child_timeout``, ``child_memory``, or
             ``child_died`` with the tail of its standard error.
     """
     module, _, name = function.partition(":")
-    call = {"function": name, "payload": payload, "memory_bytes": int(memory_bytes), "directory": str(Path.cwd())}
+    if alone():
+        return getattr(importlib.import_module(module), name)(payload)
+    call = {"function": name, "payload": payload, "memory_bytes": int(memory_bytes), "timeout_s": timeout_s}
     call |= {"kept": None if kept is None else kept[0], "fork": fork}
+    where = Path.cwd() if confinement is None or not confinement.strange else confinement.directory or "/"
+    call |= {"confinement": None if confinement is None else asdict(confinement), "directory": str(where)}
     nursery = _free(module)
     try:
         status, answer = nursery.ask(encode(call), timeout_s, kept, tell)
@@ -154,7 +166,7 @@ class _Nursery:
                 stderr=self._log,
                 pass_fds=[theirs.fileno()],
                 process_group=0,
-                env={**os.environ, **_ONE_THREAD, "PYTHONPATH": path},
+                env={**clean(dict(os.environ)), **_ONE_THREAD, "PYTHONPATH": path},
             )
 
     def ask(self, request: bytes, timeout_s: float, kept: tuple[str, str] | None, tell: Tell | None) -> tuple[int, bytes]:

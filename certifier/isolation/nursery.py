@@ -26,10 +26,9 @@ from typing import Any
 from certifier.errors import CirisError
 from certifier.isolation import telling
 from certifier.isolation.child import ERRORS, KEEP, LOADED, STATUS, TOLD, decode, encode
+from certifier.isolation.confinement import MOST_WRITTEN, Confinement, confine, limit
 from certifier.orphans import die_with_parent
 
-_MOST_WRITTEN = 2**28
-"""A child may write this many bytes of its answer, and of any file, its log among them."""
 _CHUNK = 2**16
 _kept: dict[str, Any] = {}
 
@@ -40,6 +39,7 @@ def main() -> None:
         module = importlib.import_module(sys.argv[1])
         if hasattr(module, "warm_up"):
             module.warm_up()
+    confine(None)
     gc.freeze()  # what is loaded stays: collecting garbage need not look at it, nor copy its pages in a child
     try:
         connection.send_bytes(LOADED)
@@ -118,7 +118,7 @@ def _forked(module: ModuleType, connection: Connection, call: dict[str, Any]) ->
         os._exit(_answer(module, call, writing, nursery))
     os.close(writing)
     answer, gone = bytearray(), False
-    while len(answer) <= _MOST_WRITTEN:
+    while len(answer) <= MOST_WRITTEN:
         gone = connection in wait([reading, connection])  # the asking process sends nothing before there is an answer
         chunk = b"" if gone else os.read(reading, _CHUNK)
         if not chunk:
@@ -129,7 +129,7 @@ def _forked(module: ModuleType, connection: Connection, call: dict[str, Any]) ->
             for line in told:
                 connection.send_bytes(TOLD + line)
     os.close(reading)
-    if gone or len(answer) > _MOST_WRITTEN:
+    if gone or len(answer) > MOST_WRITTEN:
         os.kill(child, signal.SIGKILL)
     _, status = os.waitpid(child, 0)
     if gone:
@@ -139,7 +139,10 @@ def _forked(module: ModuleType, connection: Connection, call: dict[str, Any]) ->
 
 def _answer(module: ModuleType, call: dict[str, Any], writing: int, nursery: int) -> int:
     """Answers a call in the child, and returns the child's exit status."""
-    _confine(call["memory_bytes"], nursery)
+    die_with_parent(parent=nursery)
+    limit(call["memory_bytes"], call["timeout_s"])
+    if call["confinement"] is not None:
+        confine(Confinement(**call["confinement"]))
     telling.begin(writing)
     status, reply = _computed(module, call)
     with os.fdopen(writing, "wb") as answer:
@@ -163,14 +166,6 @@ def _computed(module: ModuleType, call: dict[str, Any]) -> tuple[int, bytes]:
     finally:
         sys.stdout.flush()
         sys.stderr.flush()
-
-
-def _confine(memory_bytes: int, nursery: int) -> None:
-    """Limits what this process may take, lets it write no core file, and makes it die with the nursery."""
-    resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (_MOST_WRITTEN, _MOST_WRITTEN))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    die_with_parent(parent=nursery)
 
 
 if __name__ == "__main__":

@@ -27,6 +27,9 @@ if TYPE_CHECKING:  # The command packs bundles without numpy, which the model ne
 
 INDEX = "bundle.json"
 """In this file the bundle says which file is the scene file."""
+BYTES_A_SECOND = 100_000
+"""For every BYTES_A_SECOND bytes of its zip, a bundle may take one second more. What it unpacks to does not count.
+"""
 SMALLER = "use smaller meshes, or fewer of them"
 """This is what to do about a bundle that is too large."""
 _READER = "certifier.scene.unpack:parse_bundle"
@@ -41,15 +44,21 @@ class BundleLimits:
         bytes: bytes of the zip.
         unpacked_bytes: bytes of its content.
         files: number of its files.
-        timeout_s: seconds that parsing it may take.
+        timeout_s: seconds that parsing the smallest one may take; a second more for every ``BYTES_A_SECOND`` bytes of the zip.
+        longest_s: seconds that parsing any may take.
         memory_bytes: bytes of memory that parsing it may take.
     """
 
     bytes: int = 64 * 2**20
     unpacked_bytes: int = 256 * 2**20
     files: int = 1000
-    timeout_s: float = 60
+    timeout_s: float = 20
+    longest_s: float = 60
     memory_bytes: int = 4 * 2**30
+
+    def seconds(self, size: int) -> float:
+        """Returns how many seconds parsing a zip of ``size`` bytes may take."""
+        return min(self.timeout_s + size / BYTES_A_SECOND, self.longest_s)
 
 
 def pack_bundle(path: str | Path) -> bytes:
@@ -109,12 +118,14 @@ def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Scene:
         message = f"the bundle has {len(data)} bytes; at most {limits.bytes} are accepted"
         raise SceneError("bundle_too_large", message, field="bundle", hint=SMALLER)
     with tempfile.TemporaryDirectory(prefix="ciris-") as directory:
-        archive, root = Path(directory).resolve() / "bundle.zip", Path(directory).resolve() / "files"
+        own = Path(directory).resolve()
+        archive, root = own / "bundle.zip", own / "files"
         archive.write_bytes(data)
         root.mkdir()
         payload = {"archive": str(archive), "root": str(root), "limits": asdict(limits)}
         try:
-            return Scene.from_document(read_in_child(_READER, payload, "the bundle", limits.timeout_s, limits.memory_bytes))
+            seconds = limits.seconds(len(data))
+            return Scene.from_document(read_in_child(_READER, payload, "the bundle", seconds, limits.memory_bytes, str(own)))
         except CirisError as error:
             error.message = error.message.replace(f"{root}/", "")
             raise

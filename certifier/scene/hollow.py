@@ -16,12 +16,17 @@ from scipy.spatial import ConvexHull, QhullError
 
 from certifier.model import Array, Geometry, Scene
 from certifier.scene.decomposition.solid import wound
+from certifier.scene.hull import principal_axes
 
 _POINTS = 500
 """About this many points are spread over the faces of a hull."""
 _OF_PART = 50
 """About this many points are spread over the faces of a part."""
 _CLIMBS = 12
+_LOOKS, _LOOKS_A_TRIANGLE, _MIDDLES = 1_000_000, 16, 64
+"""At most _LOOKS distances from triangles are taken for a mesh, and _LOOKS_A_TRIANGLE more for each of its triangles. Looking at the
+middles of _MIDDLES triangles takes the place of one distance. Where nearly all triangles have to be looked at, fewer points are tried.
+"""
 _MOVES = np.eye(3)[[0, 1, 2, 0, 1, 2]] - np.eye(3)[[1, 2, 0, 2, 0, 1]]
 _NOTABLE = 1e-3
 """A hull that reaches less than this fraction of its length beyond the mesh is as good as the mesh."""
@@ -58,7 +63,7 @@ def beyond_solid(part: Array, points: Array, triangles: NDArray[np.int64]) -> fl
     corners = points[triangles]
     spots = np.array([weights @ triangle for weights, triangle in _spread(_faces(part), _OF_PART)])
     distances = _Distances(corners)
-    reached = max((distances.of(spot) for spot in spots[~wound(corners, spots)]), default=0.0)
+    reached = max((distances.of(spot) for spot in spots[~wound(corners, spots)] if distances.looks > 0), default=0.0)
     return reached if reached > _NOTABLE * float(np.ptp(points, axis=0).max()) else 0.0
 
 
@@ -101,7 +106,7 @@ def _faces(points: Array) -> Array:
     try:
         return points[ConvexHull(points).simplices]
     except QhullError:
-        in_plane = (points - points.mean(axis=0)) @ np.linalg.svd(points - points.mean(axis=0))[2].T
+        in_plane = (points - points.mean(axis=0)) @ principal_axes(points - points.mean(axis=0)).T
     try:
         outline = points[ConvexHull(in_plane[:, :2]).vertices]
         return np.array([[outline[0], b, c] for b, c in itertools.pairwise(outline[1:])])
@@ -115,7 +120,8 @@ def _beyond(hull: Array, triangles: Array, slack: float) -> float:
     if not len(triangles):
         return 0.0
     distances = _Distances(triangles)
-    farthest, reached = max(((point, distances.of(point[0] @ point[1])) for point in _spread(hull, _POINTS)), key=lambda found: found[1])
+    found = ((point, distances.of(point[0] @ point[1])) for point in reversed(_spread(hull, _POINTS)) if distances.looks > 0)
+    farthest, reached = max(found, key=lambda pair: pair[1])
     reached = _climbed(*farthest, reached, distances) - slack
     return reached if reached > _NOTABLE * float(np.ptp(hull.reshape(-1, 3), axis=0).max()) else 0.0
 
@@ -136,6 +142,8 @@ def _climbed(weights: Array, triangle: Array, reached: float, distances: _Distan
     """Returns the greatest distance that a climb within the triangle finds."""
     step = 1 / 4
     for _ in range(_CLIMBS):
+        if distances.looks <= 0:
+            break
         moved = [np.maximum(weights + step * move, 0.0) for move in _MOVES]
         found = [(distances.of(w @ triangle / w.sum()), k) for k, w in enumerate(moved)]
         distance, k = max(found)
@@ -147,11 +155,16 @@ def _climbed(weights: Array, triangle: Array, reached: float, distances: _Distan
 
 
 class _Distances:
-    """Gives the distances of points from the nearest of triangles (t, 3, 3)."""
+    """Gives the distances of points from the nearest of triangles (t, 3, 3).
+
+    Attributes:
+        looks: how many distances from triangles may still be taken; the caller stops at 0.
+    """
 
     def __init__(self, triangles: Array) -> None:
         self._triangles, self._middles = triangles, triangles.mean(axis=1)
         self._reach = np.linalg.norm(triangles - self._middles[:, None], axis=2).max(axis=1)
+        self.looks = _LOOKS + _LOOKS_A_TRIANGLE * len(triangles)
 
     def of(self, point: Array) -> float:
         """Returns the distance of a point (3,).
@@ -159,7 +172,9 @@ class _Distances:
         That from a triangle is at least the distance from its middle less the middle's from the corners. So few have to be looked at.
         """
         far = np.linalg.norm(self._middles - point, axis=1)
-        return float(np.sqrt(_squared(point, self._triangles[far - self._reach <= far.min()]).min()))
+        near = self._triangles[far - self._reach <= far.min()]
+        self.looks -= len(near) + len(far) // _MIDDLES
+        return float(np.sqrt(_squared(point, near).min()))
 
 
 def _squared(point: Array, triangles: Array) -> Array:

@@ -124,7 +124,7 @@ def inner(vertices: Array) -> tuple[Array, Array]:
 
 def thickened(points: Array) -> Array:
     """Returns the points, or two copies of them, one on either side of their plane, when they are flat."""
-    axes = np.linalg.svd(points - points.mean(axis=0))[2]
+    axes = principal_axes(points - points.mean(axis=0))
     extent = np.ptp(points @ axes.T, axis=0)
     if extent[2] > _FLAT * extent[0]:
         return points
@@ -132,12 +132,17 @@ def thickened(points: Array) -> Array:
     return np.concatenate([points - offset, points + offset])
 
 
+def principal_axes(points: Array) -> Array:
+    """Returns the orthonormal directions, (3, 3), one a row, in which points (k, 3) extend from the origin, the longest first."""
+    return np.linalg.svd(points, full_matrices=len(points) < 3)[2]  # the other factor, (k, k), is not needed
+
+
 def _cut_down(points: Array, max_vertices: int) -> Array:
     """Returns the vertices of the last intersection of half-spaces that has at most max_vertices.
 
     The origin must be inside the hull of the points.
     """
-    axes = np.linalg.svd(points)[2]
+    axes = principal_axes(points)
     normals = np.concatenate([axes, -axes])
     vertices = _intersection(normals, points)
     distances: dict[bytes, tuple[Array, float]] = {}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from certifier.errors import CirisError, SceneError
 from certifier.isolation.child import run_in_child
+from certifier.isolation.confinement import Confinement
 from certifier.scene.file import existing, read_scene_file
 
 if TYPE_CHECKING:  # The command packs scene files without numpy, which the model needs.
@@ -37,21 +38,25 @@ def load_scene(path: str | Path, *, timeout_s: float = TIMEOUT_S, memory_bytes: 
     return Scene.from_document(document)
 
 
-def read_in_child(function: str, payload: dict[str, Any], name: str, timeout_s: float, memory_bytes: int) -> dict[str, Any]:
+def read_in_child(
+    function: str, payload: dict[str, Any], name: str, timeout_s: float, memory_bytes: int, strange: str | None = None
+) -> dict[str, Any]:
     """Returns the document that a function returns in a child process.
 
-    The function gets the payload and, as its ``scratch``, the path of an empty directory for its files.
+    The function gets the payload and, as its ``scratch``, the path of an empty directory for its files. It writes only there.
 
     Args:
         name: name of what is read, for people.
+        strange: the directory of a stranger's files; the child reads and writes only there, and its scratch is in it. None: it may read
+            every file, for models may be anywhere.
 
     Raises:
         SceneError: whatever the function raises, or ``scene_model_crash``.
     """
     try:
-        with tempfile.TemporaryDirectory(prefix="ciris-") as scratch:  # it goes even if the child is killed
-            call = {**payload, "scratch": scratch}
-            document: dict[str, Any] = run_in_child(function, call, timeout_s=timeout_s, memory_bytes=memory_bytes)
+        with tempfile.TemporaryDirectory(dir=strange, prefix="ciris-") as scratch:  # it goes even if the child is killed
+            call, confinement = {**payload, "scratch": scratch}, Confinement(strange or scratch, strange is not None)
+            document: dict[str, Any] = run_in_child(function, call, timeout_s=timeout_s, memory_bytes=memory_bytes, confinement=confinement)
     except SceneError:
         raise
     except CirisError as death:

@@ -6,6 +6,7 @@ PROOF_FILES = ("certifier/document.py", "certifier/proof/", "certifier/verify/")
 """What these refuse is a file that is broken or was changed; the tests of certifier/verify and certifier/proof change files."""
 
 TESTED = {
+    "api/children.py:run": "tests/api/test_places.py",
     "api/connections.py:": "tests/api/test_connections.py",
     "api/problems.py:_http": "tests/api/test_odd_requests.py",
     "api/problems.py:_unavailable": "tests/api/test_odd_requests.py",
@@ -91,7 +92,6 @@ TESTED = {
 """Maps a function to the test file that provokes its errors."""
 
 UNTESTED = {
-    "api/children.py:run": "many uploads or checks at the same time",
     "api/questions.py:ask": "many large questions at the same time",
     "certifier/jobs/clearance.py:clearance": "a region of a scene without pairs",
     "certifier/polytopes/ellipsoid.py:inscribed_ellipsoid": "a polytope whose linear algebra breaks down",

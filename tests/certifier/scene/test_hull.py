@@ -1,5 +1,6 @@
 """Outer approximations contain what they replace, and say how far they reach."""
 
+import time
 from fractions import Fraction
 
 import numpy as np
@@ -150,3 +151,23 @@ def test_a_half_space_within_reach_is_a_box(center, reach):
     assert np.all(below >= body.vertices.min(axis=0) - 1e-12)
     assert np.all(below <= body.vertices.max(axis=0) + 1e-12)
     assert body.vertices[:, 2].max() == 0.0
+
+
+def test_the_time_for_a_mesh_grows_no_faster_than_its_size():
+    """Meshes are the worst of their kind: all points on the hull, or every triangle as near as any other."""
+
+    def round_mesh(size):
+        points = shapes._spread(size)
+        return points, ConvexHull(points).simplices.astype(np.int64)
+
+    def crossing_mesh(size):
+        return np.vstack([np.zeros(3), np.eye(3)]), np.tile([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]], (20 * size // 4, 1))
+
+    def seconds(mesh):
+        began = time.process_time()
+        shapes.polytope({"kind": "mesh"}, *mesh, 32)
+        return time.process_time() - began
+
+    for kind, size in ((round_mesh, 5_000), (crossing_mesh, 1_000)):
+        first, _, last = (seconds(kind(n * size)) for n in (1, 2, 4))
+        assert last < 10 * first, "four times the size; a quadratic cost would be 16 times"
