@@ -94,7 +94,12 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.keyring = Keyring(app.state.database, open_without_keys=settings().loopback)
     app.state.announcer = Announcer()
     app.add_middleware(delivery.Unchanged)
-    app.add_middleware(GZipMiddleware, **delivery.GZIP)
+    app.add_middleware(
+        GZipMiddleware,
+        minimum_size=delivery.COMPRESSED_BYTES,
+        compresslevel=delivery.COMPRESSION,
+        exclude_content_types=delivery.NOT_COMPRESSED,
+    )
     app.add_middleware(delivery.Head)
     app.add_middleware(delivery.Methods)
     app.add_middleware(

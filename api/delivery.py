@@ -17,12 +17,10 @@ from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES
 from starlette.routing import BaseRoute, Match
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-GZIP = {
-    "minimum_size": 2048,
-    "compresslevel": 5,
-    "exclude_content_types": (*DEFAULT_EXCLUDED_CONTENT_TYPES, "application/octet-stream", "application/x-npz"),
-}
-"""Options of Starlette's GZipMiddleware. Proofs and arrays are zips already, and a stream of events must not be held back."""
+COMPRESSED_BYTES, COMPRESSION = 2048, 5
+"""Answers of at least this many bytes are compressed, at this level of zlib."""
+NOT_COMPRESSED = (*DEFAULT_EXCLUDED_CONTENT_TYPES, "application/octet-stream", "application/x-npz")
+"""Proofs and arrays are zips already, and a stream of events must not be held back."""
 KEPT = "private, no-cache"
 """The client may keep the answer, and asks whether it is still so before it uses it."""
 _MARK = "_ciris_unchanging"

@@ -134,7 +134,7 @@ def render(
     """
     answered = requests.totals()
     passed = {check: int(said == OK) for check, said in checks.items()}
-    pools = {(("pool", pool), ("use", use)): count for (pool, use), count in connections.items()}
+    pools: Samples = {(("pool", pool), ("use", use)): count for (pool, use), count in connections.items()}
     families = [
         _family("ciris_check", "gauge", "1 where a check of /readyz says ok, else 0.", _by("check", passed)),
         _family("ciris_database_connections", "gauge", "Connections of this process, by pool and use.", pools),

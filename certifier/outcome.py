@@ -2,6 +2,9 @@
 
 from enum import StrEnum
 
+DEADLINE = "the deadline was reached"
+"""The reason for the end of a job begins with this where it was the deadline."""
+
 
 class Outcome(StrEnum):
     """An outcome says what a certification found out about one pair of bodies, or about a whole polytope or motion."""

@@ -18,7 +18,7 @@ from typing import Any
 
 import certifier
 from certifier.errors import CirisError
-from certifier.growth.refusal import DEADLINE
+from certifier.outcome import DEADLINE
 from ciris.find import api_key, data_dir, running_stack
 from ciris.synchronous.client import Client
 from client import output, service

@@ -109,9 +109,11 @@ def _held(session: Session, rows: Sequence[JobRow]) -> dict[str, datetime]:
         (PairRow, PairState.RUNNING, [row for row in rows if row.running_pairs > 0]),
         (StepRow, StepState.RUNNING, rows),
     ):
-        query = select(model.job_id, func.max(model.lease_until)).where(model.state == state, model.job_id.in_(_ids(some)))
+        latest = func.max(model.lease_until)
+        query = select(model.job_id, latest).where(model.state == state, model.job_id.in_(_ids(some)))
         for job_id, until in session.execute(query.group_by(model.job_id)) if some else ():
-            found[job_id] = max(until, found.get(job_id, until))
+            if until is not None:
+                found[job_id] = max(until, found.get(job_id, until))
     return found
 
 

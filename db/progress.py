@@ -28,13 +28,20 @@ def of_jobs(session: Session, rows: Sequence[JobRow]) -> dict[str, tuple[int, in
     last = select(IterationRow.job_id, func.max(IterationRow.index).label("index")).where(IterationRow.job_id.in_(known))
     newest = last.group_by(IterationRow.job_id).subquery()
     is_last = (IterationRow.job_id == newest.c.job_id) & (IterationRow.index == newest.c.index)
-    columns = (IterationRow.job_id, IterationRow.index, IterationRow.state, IterationRow.together, IterationRow.parts, _size(session))
+    columns = (
+        IterationRow.job_id,
+        IterationRow.index.label("number"),
+        IterationRow.state,
+        IterationRow.together,
+        IterationRow.parts,
+        _size(session),
+    )
     iterations = session.execute(select(*columns).join(newest, is_last)).all()
     # Where every row is a pair, the job counts those that are open or running, of which there may be 100 000.
     counted = {one.job_id for one in iterations if one.state == IterationState.RUNNING and not one.parts and not one.together}
-    left = {}
+    left: dict[str, list[int]] = {}
     for states, some in (((PairState.SKIPPED,), counted), (_UNSETTLED, known.keys() - counted)):
-        left |= _in_states(session, states, [(one.job_id, one.index) for one in iterations if one.job_id in some])
+        left |= _in_states(session, states, [(one.job_id, one.number) for one in iterations if one.job_id in some])
     found = {}
     for job_id, _, _, together, parts, reused in iterations:
         row, groups = known[job_id], {int(first): len(others) for first, others in together.items()}

@@ -187,7 +187,7 @@ class Database:
         SQLite has a pool for reading and one for writing, PostgreSQL one for both.
         """
         pools = {"read": self.reader.pool, "write": self.writer.pool} if self.sqlite else {"both": self.writer.pool}
-        counts = {}
+        counts: dict[tuple[str, str], int] = {}
         for name, pool in pools.items():
             assert isinstance(pool, QueuePool)
             counts |= {(name, "used"): pool.checkedout(), (name, "idle"): pool.checkedin(), (name, "most"): pool.size()}

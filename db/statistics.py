@@ -9,7 +9,7 @@ from enum import StrEnum
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from certifier.growth.refusal import DEADLINE
+from certifier.outcome import DEADLINE
 from db import clock, jobs, work, workers
 from db.models import IterationRow, JobRow, PairRow, ProjectRow, RegionRow, StepRow, WebhookRow
 from db.settings import settings

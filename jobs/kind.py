@@ -11,10 +11,9 @@ from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
 from certifier.growth.actions import Finish
-from certifier.growth.refusal import DEADLINE
 from certifier.isolation.child import Tell, run_in_child
 from certifier.model import Scene
-from certifier.outcome import Outcome
+from certifier.outcome import DEADLINE, Outcome
 from db import steps
 from db.models import JobRow
 from db.session import Database

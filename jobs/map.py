@@ -12,12 +12,11 @@ from sqlalchemy.orm import Session
 from certifier import stored
 from certifier.errors import CirisError
 from certifier.growth.actions import Finish
-from certifier.growth.refusal import DEADLINE
 from certifier.map.options import MapOptions
 from certifier.model import Scene
 from certifier.names import MAX_NAME
 from certifier.options import read
-from certifier.outcome import Outcome
+from certifier.outcome import DEADLINE, Outcome
 from db import jobs, maps, steps
 from db.models import JobRow
 from db.session import Database

@@ -87,7 +87,7 @@ class NotCovered(BaseModel):
     summary: str = Field(description="A sentence for people.", examples=["6 pairs of neighbouring links are not covered"])
 
 
-_UPRIGHT = {"name": "upright", "cone": {"body": "arm/hand", "axis": [0, 0, 1], "along": [0, 0, 1], "degrees": 15}}
+_UPRIGHT: dict[str, Any] = {"name": "upright", "cone": {"body": "arm/hand", "axis": [0, 0, 1], "along": [0, 0, 1], "degrees": 15}}
 _STATEMENT = "the direction (0, 0, 1) of 'cup/cup' stays within 15 degrees of (0, 0, 1) of 'world'"
 
 

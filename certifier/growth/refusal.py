@@ -7,10 +7,9 @@ from certifier.errors import CirisError, RegionError
 from certifier.growth.state import GrowthState
 from certifier.growth.whole import REVOKED
 from certifier.model import Scene
+from certifier.outcome import DEADLINE
 from certifier.seeding.proposal import NO_ROOM, TOO_LONG, mend
 
-DEADLINE = "the deadline was reached"
-"""The reason of a growth that had no time left."""
 THIN = "the space that remains around the seed is too thin to continue"
 """The reason of a growth that reached a polytope whose interior is too small for doubles. Users did not give that polytope."""
 

@@ -10,13 +10,13 @@ from certifier.errors import CirisError
 from certifier.growth.actions import Candidate, Failed, Finish, Report, Transition
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
-from certifier.growth.refusal import DEADLINE, at_deadline, ended_by, refusal
+from certifier.growth.refusal import at_deadline, ended_by, refusal
 from certifier.growth.state import GrowthState
 from certifier.jobs.former import Former
 from certifier.jobs.region import Region, certified_region, growth_point, versions
 from certifier.jobs.share import SampledProposal
 from certifier.model import Polytope, Scene
-from certifier.outcome import Outcome
+from certifier.outcome import DEADLINE, Outcome
 from certifier.verify.separations import Progress
 
 REST = 4.0

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from certifier.errors import CirisError
-from certifier.growth.refusal import DEADLINE
+from certifier.outcome import DEADLINE
 from client import demo, service
 from tests.client.conftest import PLANAR, surroundings
 

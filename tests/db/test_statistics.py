@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from certifier.growth.refusal import DEADLINE
-from certifier.outcome import Outcome
+from certifier.outcome import DEADLINE, Outcome
 from db import jobs, projects, scenes, statistics
 from db.session import Database
 from db.states import JobState

@@ -10,9 +10,10 @@ import pytest
 from certifier.errors import CirisError, RegionError
 from certifier.growth.obstacles import Obstacle
 from certifier.growth.options import GrowthOptions
-from certifier.growth.refusal import DEADLINE, THIN, at_deadline, ended_by, refusal
+from certifier.growth.refusal import THIN, at_deadline, ended_by, refusal
 from certifier.growth.state import GrowthState
 from certifier.model import Polytope
+from certifier.outcome import DEADLINE
 from certifier.polytopes.polytope import chebyshev_center
 from certifier.polytopes.sampling import hit_and_run
 from certifier.seeding.proposal import NO_ROOM, mend
