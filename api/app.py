@@ -61,9 +61,10 @@ offline. Errors are problem+json (RFC 9457) with a `code`, the `field` and a `hi
 are not finite."""
 
 
-THREADS = CONNECTIONS - AT_ONCE - READERS - WRITERS - SMALL - LARGE - 1
-"""All other requests share this many threads: those connections that children, reading and writing routes, questions and keys leave."""
-
+THREADS = CONNECTIONS - AT_ONCE - READERS - WRITERS - SMALL - LARGE - 3
+"""All other requests share this many threads: those connections that children, reading and writing routes, questions, keys and the two
+probes that read the database leave.
+"""
 
 UNTRACED = frozenset({"/healthz", "/readyz", "/metrics"})
 

@@ -38,7 +38,7 @@ from db.disk import Disk
 from db.models import Owned
 from db.settings import settings
 
-CONNECTIONS = 16
+CONNECTIONS = 18
 """One process has at most this many connections. It opens them when needed and keeps them, because opening one costs more than
 most of what it is used for.
 """
