@@ -57,4 +57,6 @@ def test_every_command_of_the_quickstart_works_as_it_stands(tmp_path: Path) -> N
     with service(environment, tmp_path):
         said = [run(*step) for step in steps[up + 1 :]]
     assert "inside: 0.25, 0.3, -0.5, 0.2" in said[0]
+    assert any("condition 'forward': the direction (1, 0, 0) of 'lift_arm/tool' stays within 40 degrees" in one for one in said)
+    assert any("the condition 'forward' is not kept: the angle is 57.3 degrees, and 40 at most" in one for one in said)
     assert said[-1].startswith("between_the_boards has the joints lift_arm/lift")
