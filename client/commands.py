@@ -10,7 +10,6 @@ from typing import Any
 
 from certifier.errors import CirisError
 from certifier.outcome import Outcome
-from certifier.scene.file import read_condition_file
 from certifier.verify.decimals import at_most_mm, exactly
 from certifier.verify.uncovered import named
 from ciris.documents import Document
@@ -56,6 +55,8 @@ def scene_add(args: Namespace) -> int:
 
 
 def scene_constrain(args: Namespace) -> int:
+    from certifier.scene.file import read_condition_file  # which needs PyYAML
+
     conditions = read_condition_file(Path(args.conditions))
     with service.connect(args.url) as client:
         scene = client.constrain_scene(service.scene_name(client, args.scene), conditions, args.name)

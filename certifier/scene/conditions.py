@@ -83,7 +83,7 @@ def swept_in(scene: Scene) -> Collection[str]:
     """Returns the joints of a scene that are swept.
 
     Raises:
-        SceneError: ``condition``, for a scene that was read before ciris kept their names, where some are.
+        SceneError: ``condition``, where some are, in a scene that was read before their names were kept.
     """
     known: list[str] | None = scene.provenance.get("swept")
     if known is None and any(" is swept from " in warning for warning in scene.warnings):

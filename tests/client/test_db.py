@@ -50,7 +50,7 @@ def test_there_and_back_with_a_backup(tmp_path: Path) -> None:
     assert db(other, "upgrade").returncode == 0
     database = Database(f"sqlite:///{other / 'ciris.sqlite3'}")
     with database.read() as session:
-        assert keys.ring(session).check(key) is not None
+        assert keys.check(session, key) is not None
     database.close()
 
 

@@ -10,6 +10,7 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 from sqlalchemy.orm import Session
 
+from db import version
 from db.models import DEFAULT_PROJECT, Base, IterationRow, JobRow, PairRow, ProjectRow, StepRow, WebhookRow
 from db.session import Database
 from db.states import JobState, PairState, StepState, WebhookState, sources, transition, unfinished
@@ -23,6 +24,9 @@ def session() -> Iterator[Session]:
     """One writing transaction on a database in memory."""
     database = Database("sqlite://")
     Base.metadata.create_all(database.writer)
+    with database.writer.begin() as connection:
+        connection.exec_driver_sql("CREATE TABLE alembic_version (version_num VARCHAR(32) NOT NULL)")
+        connection.exec_driver_sql("INSERT INTO alembic_version VALUES (?)", (version.revisions()[-1],))
     with database.write() as session:
         session.add(ProjectRow(name=DEFAULT_PROJECT))
         a_running_job(session, pair_count=1)

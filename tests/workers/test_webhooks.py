@@ -356,7 +356,7 @@ def test_private_addresses_are_not_called_and_nobody_learns_which_names_are_know
     with environment(CIRIS_DATABASE_URL=database_url, CIRIS_WEBHOOK_HOSTS=f"elsewhere:{port}"):
         for url, error in (
             (f"http://{host}/", f"{host} has no public address"),
-            (f"http://{host}:{port}/", f"port {port} of {host} may not be"),
+            (f"http://{host}:{port}/", f"port {port} of {host} may not be called"),
         ):
             job_id = a_webhook(url)
             deliver_due()
