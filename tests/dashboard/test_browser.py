@@ -66,7 +66,7 @@ def test_what_leaves_the_machine_is_noticed(page: Any, outside: tuple[str, list[
 
 def test_a_job_is_followed_live_to_its_end(page: Any, url: str, database: Database, scene: Scene, job_id: str) -> None:
     page.goto(f"{url}/jobs/{job_id}")
-    page.get_by_text("Waiting for a worker").wait_for()
+    page.get_by_text("queued: no worker").first.wait_for()
     page.evaluate("window.loadedOnce = true")
     begin(database, scene, job_id)
     page.get_by_text("0 of 2 pairs settled").wait_for()

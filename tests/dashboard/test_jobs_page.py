@@ -12,6 +12,7 @@ from certifier.model import Scene
 from db import jobs
 from db.models import JobRow
 from db.session import Database
+from tests.db.builders import add_pairs
 
 
 @pytest.fixture
@@ -24,6 +25,7 @@ def listed(database: Database, scene: Scene, planar: Scene) -> dict[str, str]:
         session.flush()
         jobs.cancel(session, cancelled.id)
         found = session.get_one(JobRow, waiting.id)
+        add_pairs(session, found, 12)
         found.pieces, found.open_pairs, found.running_pairs = 12, 4, 1
         return {"waiting": waiting.id, "cancelled": cancelled.id, "cover": cover.id}
 

@@ -381,8 +381,8 @@ def test_a_lease_goes_by_the_databases_clock(db: Database, monkeypatch: pytest.M
         monkeypatch.setattr("db.clock.utcnow", lambda wrong=wrong: utcnow() + wrong)
         held = claim(db, job_id)
         assert held is not None
+        leases._renew(db, PairRow, held.token, 60)
         with db.write() as session:
-            leases._renew(db, PairRow, held.token, 60)
             (row,) = leases.of_job(session, PairRow, job_id)
             row.worker = ELSEWHERE
             assert row.lease_until is not None
