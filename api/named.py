@@ -7,9 +7,11 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
-from certifier.configurations import Configurations, is_known, positions
+from certifier.configurations import full_names, is_known, positions
+from certifier.errors import RegionError
 from certifier.model import Scene
 from db import scenes
+from db.scenes import Known
 from db.session import Database
 from jobs.fields import Named, NamedOrRegion
 
@@ -17,10 +19,10 @@ Body = TypeVar("Body", bound=BaseModel)
 _ID = re.compile(r"[0-9a-f-]{4,64}")
 
 
-def with_positions(db: Database, scene_id: str, scene: Scene, body: Body) -> Body:
+def with_positions(db: Database, scene: Scene, body: Body) -> Body:
     """Returns a request with joint positions in the place of the names of configurations; the id of a region stays.
 
-    The names mean what the scene file says that was added last: the row has it, and the scene in memory may be older.
+    The names mean what the scene file says that was added last under the name of the scene in the request.
 
     Raises:
         RegionError: ``unknown_configuration``, ``configuration``; the field names the place.
@@ -28,7 +30,7 @@ def with_positions(db: Database, scene_id: str, scene: Scene, body: Body) -> Bod
     if not _has_names(body):
         return body
     with db.read() as session:
-        known = scenes.get(session, scene_id).document.get("configurations", {})
+        known = scenes.known(session, body.scene)  # type: ignore[attr-defined]
     filled: Body = _filled(body, scene, known, "")
     return filled
 
@@ -47,12 +49,13 @@ def _has_names(value: Any) -> bool:
             return False
 
 
-def _filled(value: Any, scene: Scene, known: Configurations, field: str) -> Any:
+def _filled(value: Any, scene: Scene, known: Known, field: str) -> Any:
     match value:
-        case NamedOrRegion() if not is_known(value, known) and _ID.fullmatch(value):
+        case NamedOrRegion() if not is_known(value, known.configurations) and _ID.fullmatch(value):
             return str(value)
         case Named():
-            return positions(value, known, [joint.name for joint in scene.moving], scene.q_star.tolist(), field)
+            _check_agree(value, known, field)
+            return positions(value, known.configurations, [joint.name for joint in scene.moving], scene.q_star.tolist(), field)
         case BaseModel():
             changed = {
                 name: _filled(member, scene, known, f"{field}.{name}".removeprefix(".")) for name, member in value if _has_names(member)
@@ -62,3 +65,16 @@ def _filled(value: Any, scene: Scene, known: Configurations, field: str) -> Any:
             return [_filled(member, scene, known, f"{field}[{i}]") for i, member in enumerate(value)]
         case _:
             return value
+
+
+def _check_agree(text: str, known: Known, field: str) -> None:
+    """Refuses the names of configurations that are different ones under different names of the scene.
+
+    Raises:
+        RegionError: ``configuration``.
+    """
+    for name in full_names(text, known.configurations, field):
+        if name in known.clashing:
+            one, other = known.clashing[name]
+            message = f"{name!r} means other positions under the scene's name {one!r} than under {other!r}"
+            raise RegionError("configuration", message, field=field, hint="name the scene in the place of its id, or write NAME@ID")

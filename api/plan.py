@@ -68,7 +68,7 @@ def answer(asked: Asked, body: PlanRequest) -> PlanResponse:
             raises, or what befell a child process.
     """
     scene_id, scene, library = answers.asked(asked.db, asked.libraries, body.scene)
-    body = with_positions(asked.db, scene_id, scene, body)
+    body = with_positions(asked.db, scene, body)
     question = _question(asked, body, scene_id, scene, library)
     of_scene: dict[str, Any] = {"scene": question.scene_id, "version": question.library.version, "regions": len(question.library)}
     found = None if body.regions_only else _known(question)

@@ -27,7 +27,9 @@ def is_configuration_name(text: object) -> bool:
 
 
 def is_number(text: str) -> bool:
-    """Returns whether Python reads a number in the text; NaN and infinity count."""
+    """Returns whether the text is a number as data files write it, in ASCII and without ``_``; NaN and infinity count."""
+    if not text.isascii() or "_" in text:
+        return False
     try:
         float(text)
     except ValueError:
@@ -38,6 +40,15 @@ def is_number(text: str) -> bool:
 def is_known(text: str, configurations: Configurations) -> bool:
     """Returns whether each name of a text stands for a configuration, or may stand for several."""
     return all(name == Q_STAR or _fitting(name, configurations) for name in _names(text))
+
+
+def full_names(text: str, configurations: Configurations, field: str | None = None) -> list[str]:
+    """Returns the full names of the configurations that a text of names stands for, without ``q_star``.
+
+    Raises:
+        RegionError: ``unknown_configuration``.
+    """
+    return [_full(name, configurations, field) for name in _names(text) if name != Q_STAR]
 
 
 def positions(

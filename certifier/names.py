@@ -8,6 +8,9 @@ MAX_NAME, MAX_SENTENCE = 200, 500
 """A name has at most MAX_NAME characters, and a sentence of free text has at most MAX_SENTENCE."""
 ALPHABET = f"at most {MAX_NAME} ASCII letters, digits, _-./:+@#()[],= and single spaces inside"
 """This text tells people what a name may consist of (:func:`is_name`)."""
+SCENE_ALPHABET = f"{ALPHABET}; neither 16 or 64 digits of 0-9a-f, nor . or .. between slashes"
+"""This text tells people what a scene may be called (:func:`is_scene_name`)."""
+_ID = re.compile(r"[0-9a-f]{16}|[0-9a-f]{64}")
 _NAME = re.compile(r"[\w\-./:+@#()\[\],=]+(?: [\w\-./:+@#()\[\],=]+)*", re.ASCII)
 
 
@@ -18,6 +21,14 @@ def is_name(text: object) -> bool:
     names, so nothing in a name may look like another line or control a terminal.
     """
     return isinstance(text, str) and len(text) <= MAX_NAME and _NAME.fullmatch(text) is not None
+
+
+def is_scene_name(text: object) -> bool:
+    """Returns whether a scene may have this name: as :func:`is_name`, but not what looks like an id, and no path with ``.`` or ``..``.
+
+    An id of a scene has 16 or 64 digits of 0-9a-f. Addresses of pages and requests contain names, and browsers resolve dots in them.
+    """
+    return is_name(text) and not _ID.fullmatch(str(text)) and not {".", ".."} & set(str(text).split("/"))
 
 
 def is_sentence(text: object) -> bool:

@@ -19,6 +19,8 @@ from certifier.errors import RegionError, close_matches
 
 Options = TypeVar("Options")
 _KEY = "option"
+PATH = 3
+"""The numbers of paths are so deep: a list of paths has waypoints, which have numbers."""
 
 
 class Takes(StrEnum):
@@ -189,7 +191,7 @@ def _value(one: Option, value: Any, where: str) -> Any:
         case Takes.CHOICE:
             return value if one.cls is None else one.cls(value)
         case Takes.POINT | Takes.POINTS | Takes.PATHS:
-            return _numbers(value, where, {Takes.POINT: 1, Takes.POINTS: 2, Takes.PATHS: 3}[one.takes], one.most)
+            return _numbers(value, where, {Takes.POINT: 1, Takes.POINTS: 2, Takes.PATHS: PATH}[one.takes], one.most)
     return value
 
 
@@ -222,10 +224,13 @@ def _numbers(value: Any, where: str, depth: int, most: int | None) -> Any:
         raise RegionError("option_value", f"{where.rpartition('.')[2]} must be a list{' of numbers' if depth == 1 else ''}", field=where)
     if most is not None and len(value) > most:
         raise RegionError("option_value", f"{where.rpartition('.')[2]} must have at most {most} items", field=where)
+    for i, path in enumerate(value if depth == PATH else ()):
+        if not isinstance(path, list | tuple) or len(path) < 2:
+            raise RegionError("option_value", "a path must have two waypoints at least", field=f"{where}[{i}]")
     if depth > 1:
         return tuple(_numbers(row, f"{where}[{i}]", depth - 1, most) for i, row in enumerate(value))
-    if not all(isinstance(x, int | float) and not isinstance(x, bool) for x in value):
-        raise RegionError("option_value", f"{where.rpartition('.')[2]} must be a list of numbers", field=where)
+    if not all(isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) for x in value):
+        raise RegionError("option_value", f"{where.rpartition('.')[2]} must be a list of finite numbers", field=where)
     return tuple(float(x) for x in value)
 
 

@@ -60,4 +60,4 @@ def scene_name(scene: str | Scene) -> str:
     Raises:
         CirisError: argument, for anything but a name, an id or a scene.
     """
-    return named(scene.id if isinstance(scene, Scene) else scene, "scene", "its name, its id or a ciris.Scene")
+    return named(f"{scene.name}@{scene.id}" if isinstance(scene, Scene) else scene, "scene", "its name, its id or a ciris.Scene")

@@ -19,7 +19,7 @@ def cover(args: Namespace) -> int:
     asked, screen = request(args, COVER), Screen()
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)
-        job = service.run(client, {"kind": "cover", "scene": scene["id"], **asked}, screen)
+        job = service.run(client, {"kind": "cover", "scene": service.named(scene), **asked}, screen)
         found = client.cover(job["id"])
     if args.json:
         print_json({"job": job["id"], "scene": scene["name"], **found})
@@ -40,7 +40,7 @@ def _print(found: dict[str, Any]) -> None:
         ("regions", f"{len(found['regions'])} of this cover, {sum(found['components'] or [])} of the scene"),
         ("components", _components(found["components"] or [])),
         *((f"connect[{i}]", "in no region" if part is None else f"in component {part}") for i, part in enumerate(found["connect"] or [])),
-        *((f"path[{i}]", f"covered up to {100 * part:.4g} %") for i, part in enumerate(found["paths"] or [])),
+        *((f"path[{i}]", f"covered up to {output.percent(part)}") for i, part in enumerate(found["paths"] or [])),
         *(("obstacle", text) for text in found["obstacles"] or []),
         ("time", output.seconds(found["seconds"])),
     ]

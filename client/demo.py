@@ -62,7 +62,7 @@ def _demonstrate(url: str) -> tuple[bool, str | None]:
         print(f"ciris is up at {url} (data: {data_dir()})")
         size = f"{scene['joints']} joints, {scene['geometries']} convex bodies, {scene['pairs']} pairs to separate"
         print(f"scene {scene['name']}: {size}", flush=True)
-        grown = _grown(client, {"kind": "grow", "scene": scene["id"], "seed": {"q": seed_of(str(SCENE), None)}})
+        grown = _grown(client, {"kind": "grow", "scene": service.named(scene), "seed": {"q": seed_of(str(SCENE), None)}})
     path = ProofFile(str(data_dir() / f"{file_name(scene['name'])}.proof")).write(scene["name"], grown.proof)
     print("\nevery pair of bodies:")
     output.print_pairs(grown.manifest["pairs"])

@@ -15,13 +15,15 @@ Given = list[float] | str
 
 
 def configuration(text: str, field: str = "--q") -> Given:
-    """Returns the numbers of a text such as ``"0, 0.3, -1.8"``; or the text itself where no part of it begins with a number.
+    """Returns the numbers of a text such as ``"0, 0.3, -1.8"`` or ``"[0, 0.3]"``; or the text itself where no part begins with a number.
 
     Raises:
         RegionError: bad_number, naming the place.
     """
-    begins = [part.split()[0] for part in text.split(",") if part.strip()]
-    return numbers(text, field) if not begins or any(map(is_number, begins)) else text.strip()
+    inside = text.strip()
+    inside = inside[1:-1] if inside.startswith("[") and inside.endswith("]") else inside
+    begins = [part.split()[0] for part in inside.split(",") if part.strip()]
+    return numbers(inside, field) if not begins or any(map(is_number, begins)) else text.strip()
 
 
 def shown(given: Given) -> str:
@@ -37,13 +39,9 @@ def numbers(text: str, field: str) -> list[float]:
     """
     values = []
     for i, part in enumerate(text.replace(",", " ").split()):
-        try:
-            value = float(part)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise RegionError("bad_number", f"{part!r} is not a finite number", field=f"{field}[{i}]", hint=_LIST)
-        values.append(value)
+        if not is_number(part) or not math.isfinite(float(part)):
+            raise RegionError("bad_number", f"{part[:100]!r} is not a finite number", field=f"{field}[{i}]", hint=_LIST)
+        values.append(float(part))
     if not values:
         raise RegionError("bad_number", "no numbers were given", field=field, hint=_LIST)
     return values

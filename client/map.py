@@ -65,10 +65,10 @@ def _here(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
     refuse_of_service(args)
     screen = Screen()
     scene = load(args.scene)
-    wanted = [_wanted(scene, q, f"options.at[{i}]") for i, q in enumerate(asked["options"].pop("at", []))]
-    given = enumerate(asked["options"].pop("paths", []))
+    at = [_wanted(scene, q, f"options.at[{i}]") for i, q in enumerate(asked["options"].get("at", []))]
+    given = enumerate(asked["options"].get("paths", []))
     paths = [[_wanted(scene, q, f"options.paths[{i}][{j}]") for j, q in enumerate(path)] for i, path in given]
-    options = read(MapOptions, asked["options"], "options")
+    options = read(MapOptions, {**asked["options"], "at": at, "paths": paths}, "options")
     from certifier.jobs.map import grow_map, in_s, ways_of
 
     former = None if args.former is None else _former(args.former)
@@ -82,10 +82,10 @@ def _here(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
         asked.get("deadline_seconds"),
         cores(),
         tell,
-        in_s(scene, wanted),
+        in_s(scene, options.at),
         options.random_seed,
         former,
-        ways_of(scene, paths),
+        ways_of(scene, options.paths),
     )
     screen.clear()
     path = ProofFile(args.out).write(scene.name, found.proof.to_bytes())
@@ -99,7 +99,7 @@ def _here(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
         "seconds": found.seconds,
         "ended": found.reason,
         "given_up": found.refused,
-        "at": [{"q": list(q), "state": state} for q, state in zip(wanted, found.wanted, strict=True)],
+        "at": [{"q": list(q), "state": state} for q, state in zip(at, found.wanted, strict=True)],
         "paths": _shares(found.proof, paths) if paths else [],
         "proof": str(path),
     }
@@ -110,7 +110,7 @@ def _by_service(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)
         former = {} if args.former is None else {"former": args.former}
-        job = service.run(client, {"kind": "map", "scene": scene["id"], **asked, **former}, Screen())
+        job = service.run(client, {"kind": "map", "scene": service.named(scene), **asked, **former}, Screen())
         return _written(client, job["id"], scene, args.out)
 
 
@@ -162,7 +162,7 @@ def _print(document: dict[str, Any]) -> None:
     for one in document["at"]:
         print(f"q = {', '.join(f'{value:.6g}' for value in one['q'])}: {output.plain(one['state'])}")
     for i, share in enumerate(document["paths"]):
-        print(f"path[{i}]: {100 * share:.4g} % of it proved")
+        print(f"path[{i}]: {output.percent(share)} of it proved")
     if document["given_up"]:
         print(f"{document['given_up']} pieces of work were given up: the verifier refused what they found")
     if document["ended"] in ENDS:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import sys
 import time
@@ -125,6 +126,11 @@ def share(document: dict[str, Any] | None) -> str:
     if document is None or document["value"] is None:
         return "-"
     return f"{100 * document['value']:.3g} +- {100 * document['stderr']:.1g} %"
+
+
+def percent(part: float) -> str:
+    """Returns a part of a whole, which is proved, as a text for people that is no larger: 100 % is all of it."""
+    return "100 %" if part >= 1 else f"{math.floor(1e4 * part) / 100:.4g} %"
 
 
 def q_volume(document: dict[str, Any] | None) -> str:

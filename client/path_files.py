@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import csv
-import json
+import io
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
-import yaml
 
+from certifier.configurations import is_number
 from certifier.errors import CirisError, RegionError
 from certifier.model import Array
 from certifier.motion.splines import curve
+from client.number_files import UNREADABLE, NotNumbers, checked, document_of, text_of
 from client.paths import FIELD, GivenPath
 
 KINDS = (".npz", ".json", ".yaml", ".yml", ".csv")
@@ -42,7 +44,9 @@ def path_file(path: str) -> GivenPath:
         raise RegionError("path_file", f"there is no file {path}", field=FIELD, hint=_HINT) from None
     except CirisError:
         raise
-    except (OSError, ValueError, TypeError, BadZipFile, EOFError, yaml.YAMLError, RecursionError):
+    except NotNumbers as error:
+        raise RegionError("path_file", f"{path}: {error}", field=FIELD, hint=_HINT) from None
+    except (*UNREADABLE, BadZipFile):
         kind = suffix[1:].upper().replace("NPZ", "npz")
         raise RegionError("path_file", f"{path} is no {kind} file of numbers", field=FIELD, hint=_HINT) from None
     given = {name: content[name] for name in _NAMES[:-1] if name in content}
@@ -68,40 +72,40 @@ def path_file(path: str) -> GivenPath:
 
 def _arrays(path: str) -> dict[str, Array]:
     with np.load(path, allow_pickle=False) as arrays:
-        return {name: arrays[name].astype(float, casting="same_kind") for name in arrays.files if name in _NAMES}
+        found = {name: arrays[name].astype(float, casting="same_kind") for name in arrays.files if name in _NAMES}
+    for name, array in found.items():
+        if not np.isfinite(array).all():
+            raise NotNumbers(f"{name} has numbers that are not finite")
+    return found
 
 
 def _document(path: str) -> dict[str, Any]:
     """Returns the arrays of a document; where rows of q are names, q as a list."""
-    text = Path(path).read_text(encoding="utf-8")
-    document: Any = json.loads(text) if path.lower().endswith(".json") else yaml.safe_load(text)
-    if not isinstance(document, dict):
-        raise TypeError("not a mapping")
-    return {name: _rows(document[name]) if name == "q" else np.array(document[name], dtype=float) for name in _NAMES if name in document}
+    given = {name: value for name, value in document_of(path).items() if name in _NAMES}
+    return {name: _rows(value) if name == "q" else np.array(checked(value, name), dtype=float) for name, value in given.items()}
 
 
 def _rows(q: Any) -> Any:
     """Returns waypoints (K, n) as an array, or as a list with the names of configurations as they are.
 
     Raises:
-        ValueError, TypeError: they are neither names nor numbers.
+        ValueError: they are neither names nor numbers.
     """
     if not (isinstance(q, list) and any(isinstance(row, str) for row in q)):
-        return np.array(q, dtype=float)
-    return [row if isinstance(row, str) else np.array(row, dtype=float).tolist() for row in q]
+        return np.array(checked(q, "q"), dtype=float)
+    return [row if isinstance(row, str) else np.array(checked(row, f"q[{i}]"), dtype=float).tolist() for i, row in enumerate(q)]
 
 
 def _table(path: str) -> dict[str, Array]:
-    with open(path, encoding="utf-8", newline="") as file:
-        rows = [row for row in csv.reader(file) if row]
+    rows = [row for row in csv.reader(io.StringIO(text_of(path), newline="")) if row]
     if not rows:
         raise ValueError("no rows")
-    names = [] if _is_number(rows[0][0]) else [name.strip() for name in rows.pop(0)]
+    names = [] if is_number(rows[0][0]) else [name.strip() for name in rows.pop(0)]
     columns = len(names or rows[0])
     for i, row in enumerate(rows):
-        wrong = next((text for text in row if not _is_number(text)), None)
+        wrong = next((text for text in row if not is_number(text) or not math.isfinite(float(text))), None)
         if wrong is not None:
-            raise RegionError("path_file", f"{path}, waypoint {i}: {wrong!r} is no number", field=FIELD, hint=_HINT)
+            raise RegionError("path_file", f"{path}, waypoint {i}: {wrong[:100]!r} is no finite number", field=FIELD, hint=_HINT)
         if len(row) != columns:
             raise RegionError("path_file", f"{path}, waypoint {i}: it must have {columns} numbers, as the first row", field=FIELD)
     numbers = np.array([[float(text) for text in row] for row in rows])
@@ -118,11 +122,3 @@ def _table(path: str) -> dict[str, Array]:
 
 _READERS: dict[str, Callable[[str], dict[str, Any]]] = {".npz": _arrays, ".csv": _table}
 """What reads a file by its suffix, where it is not a document."""
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,10 +9,10 @@ from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
-import yaml
 
 from certifier.errors import RegionError
 from certifier.model import Array, Polytope
+from client.number_files import UNREADABLE, NotNumbers, checked, document_of
 
 SAME_CENTER = 1e-9
 """Two q* are the same where no joint differs by more than this, in radians or metres."""
@@ -62,7 +61,9 @@ def polytope_file(path: str) -> PolytopeFile:
         content = _arrays(path) if suffix == ".npz" else _document(path) if suffix in (".json", ".yaml", ".yml") else None
     except FileNotFoundError:
         raise RegionError("polytope_file", f"there is no file {path}", field="--polytope", hint=_FORMATS) from None
-    except (OSError, ValueError, TypeError, BadZipFile, EOFError, yaml.YAMLError, RecursionError):
+    except NotNumbers as error:
+        raise RegionError("polytope_file", f"{path}: {error}", field="--polytope", hint=_FORMATS) from None
+    except (*UNREADABLE, BadZipFile):
         kind = "npz" if suffix == ".npz" else suffix[1:].upper()
         raise RegionError("polytope_file", f"{path} is no {kind} file of numbers", field="--polytope", hint=_FORMATS) from None
     if content is None:
@@ -86,10 +87,7 @@ def _arrays(path: str) -> dict[str, Any]:
 
 
 def _document(path: str) -> dict[str, Any]:
-    text = Path(path).read_text(encoding="utf-8")
-    document: Any = json.loads(text) if path.lower().endswith(".json") else yaml.safe_load(text)
-    if not isinstance(document, dict):
-        raise TypeError("not a mapping")
+    document = document_of(path)
     space = document.get("space", document)
     document = {**space, **document}
     names = {
@@ -99,5 +97,5 @@ def _document(path: str) -> dict[str, Any]:
         "q_star": ("q_star",),
     }
     found = {name: next((document[key] for key in keys if key in document), None) for name, keys in names.items()}
-    numbers = {name: np.array(value, dtype=float) for name, value in found.items() if value is not None}
+    numbers = {name: np.array(checked(value, name), dtype=float) for name, value in found.items() if value is not None}
     return numbers | ({"joints": np.array(space["joints"], dtype=str)} if space.get("joints") is not None else {})

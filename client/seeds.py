@@ -5,11 +5,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import yaml
-
 from certifier.errors import CirisError
 from certifier.scene.file import existing
 from client.inputs import Given, configuration, is_scene_file
+from client.number_files import UNREADABLE, NotNumbers, checked, document_of
 
 
 def seed_file(scene: str | Path) -> Path:
@@ -34,10 +33,13 @@ def seed_of(scene: str, q: str | None) -> Given:
         hint = f"give one, or put q into {path.name} beside the scene file"
         raise CirisError("seed_missing", "no seed was given", field="--q", hint=hint)
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
-        written = document["q"]
-        return configuration(written if isinstance(written, str) else " ".join(str(float(value)) for value in written), f"{path}: q")
-    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError):
+        written = document_of(path)["q"]
+        if isinstance(written, str):
+            return configuration(written, f"{path}: q")
+        return [float(value) for value in checked(written, "q")]
+    except NotNumbers as error:
+        raise CirisError("seed_file", str(error), field=str(path), hint="write q: [0, 0.3] into it, one number for each joint") from None
+    except (*UNREADABLE, KeyError):
         hint = "write q: [0, 0.3] into it, one number for each joint"
         raise CirisError("seed_file", "it holds no list of numbers called q", field=str(path), hint=hint) from None
 

@@ -56,11 +56,16 @@ def known_scene(client: Client, scene: str) -> Document:
 
 
 def scene_name(client: Client, scene: str) -> str:
-    """Returns what a question calls a scene: the id of a scene file, which it uploads, or the name or id that was typed.
+    """Returns what a question calls a scene: ``NAME@ID`` for a scene file, which it uploads, or the name or id that was typed.
 
     The answer says if the service does not know it. So a name takes no request of its own.
     """
-    return known_scene(client, scene)["id"] if is_scene_file(scene) else scene
+    return named(known_scene(client, scene)) if is_scene_file(scene) else scene
+
+
+def named(scene: Document) -> str:
+    """Returns what a request calls a scene that the service described: this scene, with the named configurations of its name."""
+    return f"{scene['name']}@{scene['id']}"
 
 
 def grow(client: Client, request: Document, screen: Screen, watch: bool = False, idempotency_key: str | None = None) -> Grown:
@@ -127,7 +132,7 @@ def certify(client: Client, scene: Document, given: PolytopeFile, asked: Documen
     body: dict[str, Any] = {"C": given.polytope.C.tolist(), "d": given.polytope.d.tolist()}
     if given.center is not None:
         body["center"] = given.center.tolist()
-    job, _ = client.create_job({"kind": "certify", "scene": scene["id"], "polytope": body, **asked})
+    job, _ = client.create_job({"kind": "certify", "scene": named(scene), "polytope": body, **asked})
     screen.line(f"job {job['id']}: {client.url}/jobs/{job['id']}")
     job = _wait(client, job["id"], screen, watch)
     if job["outcome"] is None or (job["error"] and job["error"]["code"] not in NEGATIVE):

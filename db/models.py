@@ -82,6 +82,8 @@ class SceneNameRow(Owned, Base):
     name: Mapped[str] = mapped_column(primary_key=True)
     version: Mapped[int] = mapped_column(primary_key=True)
     scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"), index=True)
+    configurations: Mapped[Document] = mapped_column(default=dict)
+    """The named configurations: positions of joints by their names, in radians or metres."""
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
 
 

@@ -1,16 +1,22 @@
-"""Scenes never change. A project has each once for its content hash. A name means the scene that was last added under it."""
+"""Scenes never change. A project has each once for its content hash. A name means the scene that was last added under it.
+
+Named configurations are no part of a scene's content. They belong to the name, so each user of a scene may have others.
+"""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from sqlalchemy import and_, func, select
 from sqlalchemy.orm import Session
 
+from certifier.configurations import Configurations
 from certifier.errors import SceneError, close_matches
 from certifier.model import Scene
+from certifier.names import SCENE_ALPHABET, is_scene_name
 from db import pages
 from db.ids import expanded
 from db.models import DEFAULT_PROJECT, SceneNameRow, SceneRow
@@ -24,24 +30,46 @@ STAGED = "@staged"
 """A name with this behind it means the scene that is staged as the next version of the name (db.staging)."""
 
 
+@dataclass(frozen=True)
+class Known:
+    """What a scene is called, and its named configurations.
+
+    Attributes:
+        name: the name that was given, or the one that the scene was last added or staged under.
+        configurations: what each name means.
+        clashing: names of configurations that mean one thing under one name of the scene, and another thing under the other.
+    """
+
+    name: str
+    configurations: Configurations
+    clashing: Mapping[str, tuple[str, str]]
+
+    @property
+    def agreed(self) -> dict[str, dict[str, float]]:
+        """Returns those that do not clash."""
+        return {name: dict(positions) for name, positions in self.configurations.items() if name not in self.clashing}
+
+
 def add(session: Session, scene: Scene) -> SceneRow:
     """Returns the row of this scene in the session's project, or in the default one. Its name means the scene from now on.
 
     Raises:
         SceneError: scene_name.
     """
-    check_not_staged(scene.name, "name")
+    check_name(scene.name, "name")
     row = stored(session, scene)
-    mean(session, row.project, scene.name, row.id)
+    mean(session, row.project, scene.name, row.id, scene.configurations)
     return row
 
 
-def check_not_staged(name: str, field: str) -> None:
-    """Refuses a name that only a staged scene has.
+def check_name(name: str, field: str) -> None:
+    """Refuses what a scene cannot be called.
 
     Raises:
         SceneError: scene_name.
     """
+    if not is_scene_name(name):
+        raise SceneError("scene_name", f"{name[:100]!a} is no name of a scene", field=field, hint=f"names have {SCENE_ALPHABET}")
     if name.endswith(STAGED):
         hint = f"leave {STAGED} out: `ciris scene stage NAME FILE` gives such a name"
         raise SceneError("scene_name", f"{name!r} is the name of a staged scene only", field=field, hint=hint)
@@ -50,34 +78,30 @@ def check_not_staged(name: str, field: str) -> None:
 def stored(session: Session, scene: Scene) -> SceneRow:
     """Returns the row of this scene in the session's project, or in the default one. What its name means stays as it is.
 
-    It makes the row if no scene of the project has the same content. The named configurations are no part of the content, and mean what
-    the scene says that was added last.
+    It makes the row if no scene of the project has the same content.
     """
     project = project_of(session) or DEFAULT_PROJECT
     whole = scene.hash if project == DEFAULT_PROJECT else hashlib.sha256(f"{project}:{scene.hash}".encode()).hexdigest()
-    document = scene.to_document()
+    document = replace(scene, configurations={}).to_document()
     new = {"project": project, "name": scene.name, "hash": scene.hash, "document": document}
     for scene_id in (whole[:ID_LENGTH], whole):
         insert_new(session, SceneRow, [{"id": scene_id, **new}])
         row = session.scalar(select(SceneRow).where(SceneRow.project == project, SceneRow.hash == scene.hash))
         if row is not None:
             row.name = scene.name
-            named = document.get("configurations", {})
-            if row.document.get("configurations", {}) != named:
-                row.document = {**row.document, "configurations": named}
             return row
     raise AssertionError("all of a hash can only be taken by the scene that has it")
 
 
-def mean(session: Session, project: str, name: str, scene_id: str) -> None:
-    """Makes the name mean this scene. An addition that is overtaken by another one under the name comes after it."""
-    versions = select(SceneNameRow.version, SceneNameRow.scene_id).where(SceneNameRow.project == project, SceneNameRow.name == name)
+def mean(session: Session, project: str, name: str, scene_id: str, configurations: Configurations) -> None:
+    """Makes the name mean this scene, with these configurations. An addition that another one under the name overtakes comes after it."""
+    given = {one: dict(positions) for one, positions in configurations.items()}
     while True:
-        last = session.execute(versions.order_by(SceneNameRow.version.desc()).limit(1)).first()
-        if last is not None and last.scene_id == scene_id:
+        last = meaning(session, name, project)
+        if last is not None and (last.scene_id, last.configurations) == (scene_id, given):
             return
-        version = {"project": project, "name": name, "version": last.version + 1 if last else 1, "scene_id": scene_id}
-        if insert_new(session, SceneNameRow, [version]):
+        version = {"project": project, "name": name, "version": last.version + 1 if last else 1}
+        if insert_new(session, SceneNameRow, [{**version, "scene_id": scene_id, "configurations": given}]):
             return
 
 
@@ -98,32 +122,73 @@ def names(session: Session, scene_ids: Sequence[str]) -> dict[str, list[str]]:
     return found
 
 
-def meaning(session: Session, name: str) -> str | None:
-    """Returns the id of the scene that a name means; None where there is no such name."""
-    return session.scalar(select(SceneNameRow.scene_id).where(SceneNameRow.name == name).order_by(SceneNameRow.version.desc()).limit(1))
+def meaning(session: Session, name: str, project: str | None = None) -> SceneNameRow | None:
+    """Returns what a name means, in a project or in that of the session; None where there is no such name."""
+    versions = select(SceneNameRow).where(SceneNameRow.name == name)
+    versions = versions if project is None else versions.where(SceneNameRow.project == project)
+    return session.scalar(versions.order_by(SceneNameRow.version.desc()).limit(1))
 
 
-def find(session: Session, name: str) -> str:
+def find(session: Session, given: str) -> str:
     """Returns the id of the scene with this id, or else of the one that the name means, or else the only id that begins like this.
 
-    It does not read the scene's document, which may be long.
+    ``NAME@ID`` is the scene with the id as it was added under the name. It does not read the scene's document, which may be long.
 
     Raises:
         SceneError: scene_not_found, with the names that are most like it.
         CirisError: ambiguous_id.
     """
-    found = session.scalar(select(SceneRow.id).where(SceneRow.id == name)) or meaning(session, name)
+    found = _exactly(session, given)
     if found is not None:
         return found
-    longer = expanded(session, SceneRow.id, name)
-    if longer == name and name.endswith(STAGED):
-        message = f"nothing is staged as the next version of {name.removesuffix(STAGED)!r}"
+    longer = expanded(session, SceneRow.id, given)
+    if longer == given and given.endswith(STAGED):
+        message = f"nothing is staged as the next version of {given.removesuffix(STAGED)!r}"
         raise SceneError("scene_not_found", message, field="scene", hint="`ciris scene stage NAME FILE` stages a scene")
-    if longer == name:
+    if longer == given:
         known = session.scalars(select(SceneNameRow.name).order_by(SceneNameRow.created_at.desc()).limit(SUGGESTED_AMONG)).all()
-        hint = close_matches(name, list(dict.fromkeys(known))) or "`ciris scene ls`, or `scenes()` in Python, lists them"
-        raise SceneError("scene_not_found", f"there is no scene {name!r}", field="scene", hint=hint)
+        hint = close_matches(given, list(dict.fromkeys(known))) or "`ciris scene ls`, or `scenes()` in Python, lists them"
+        raise SceneError("scene_not_found", f"there is no scene {given!r}", field="scene", hint=hint)
     return longer
+
+
+def _exactly(session: Session, given: str) -> str | None:
+    """Returns the scene that has this id, that the name means, or that ``NAME@ID`` is; None where there is none."""
+    found = session.scalar(select(SceneRow.id).where(SceneRow.id == given))
+    if found is None and (named := meaning(session, given)) is not None:
+        return named.scene_id
+    if found is None and (version := _version(session, given)) is not None:
+        return version.scene_id
+    return found
+
+
+def _version(session: Session, given: str) -> SceneNameRow | None:
+    """Returns the last version of a name that meant the scene with an id, for ``NAME@ID``; None for anything else."""
+    name, _, scene_id = given.rpartition("@")
+    versions = select(SceneNameRow).where(SceneNameRow.name == name, SceneNameRow.scene_id == scene_id)
+    return session.scalar(versions.order_by(SceneNameRow.version.desc()).limit(1))
+
+
+def known(session: Session, given: str) -> Known:
+    """Returns the named configurations of a scene: those of its name, where a name is given, and of all of its names for an id.
+
+    Raises:
+        SceneError, CirisError: as :func:`find`.
+    """
+    scene_id = find(session, given)
+    if given != scene_id and (named := meaning(session, given) or _version(session, given)) is not None:
+        return Known(named.name, named.configurations, {})
+    versions = select(SceneNameRow).where(SceneNameRow.scene_id == scene_id)
+    last = {row.name: row.configurations for row in session.scalars(versions.order_by(SceneNameRow.version))}
+    found: dict[str, Mapping[str, float]] = {}
+    whose: dict[str, str] = {}
+    clashing: dict[str, tuple[str, str]] = {}
+    for name, configurations in last.items():
+        for one, positions in configurations.items():
+            if found.setdefault(one, positions) != positions:
+                clashing[one] = (whose[one], name)
+            whose.setdefault(one, name)
+    return Known(session.get_one(SceneRow, scene_id).name, found, clashing)
 
 
 @lru_cache(maxsize=16)

@@ -40,16 +40,16 @@ def stage(session: Session, name: str, scene: Scene) -> SceneRow:
     Raises:
         SceneError: scene_name, scene_not_found, scene_unchanged.
     """
-    scenes.check_not_staged(name, "stage")
+    scenes.check_name(name, "stage")
     present = scenes.meaning(session, name)
     if present is None:
         hint = "`ciris scene ls` lists the names; `ciris scene add FILE` adds the first scene of a name"
         raise SceneError("scene_not_found", f"no scene has the name {name!r}", field="stage", hint=hint)
     row = scenes.stored(session, replace(scene, name=name))
-    if row.id == present:
+    if (row.id, scene.configurations) == (present.scene_id, present.configurations):
         raise SceneError("scene_unchanged", f"{name!r} means this scene already", field="stage", hint="stage a scene that differs")
     session.execute(delete(SceneNameRow).where(SceneNameRow.project == row.project, SceneNameRow.name == name + STAGED))
-    scenes.mean(session, row.project, name + STAGED, row.id)
+    scenes.mean(session, row.project, name + STAGED, row.id, scene.configurations)
     return row
 
 
@@ -63,14 +63,16 @@ def promote(session: Session, name: str, *, without_regions: bool) -> Promotion:
         SceneError: scene_not_found.
         CirisError: scene_without_regions.
     """
-    row, before = scenes.get(session, name + STAGED), scenes.meaning(session, name)
-    numbers = regions.counts(session, [row.id] if before is None else [row.id, before])
-    done = Promotion(row.id, numbers[row.id], before, 0 if before is None else numbers[before])
+    scene_id, present = scenes.find(session, name + STAGED), scenes.meaning(session, name)
+    staged = scenes.meaning(session, name + STAGED)
+    assert staged is not None, "it was found"
+    before = None if present is None else present.scene_id
+    numbers = regions.counts(session, [scene_id] if before is None else [scene_id, before])
+    done = Promotion(scene_id, numbers[scene_id], before, 0 if before is None else numbers[before])
     if done.regions_before and not done.regions and not without_regions:
         message = f"{name + STAGED} has no regions, and {name} has {done.regions_before}: planners would find no way"
         hint = "make regions of it with `ciris recertify`, or say without_regions=true (--without-regions)"
         raise CirisError("scene_without_regions", message, field="without_regions", hint=hint)
-    scenes.mean(session, row.project, name, row.id)
-    staged = (SceneNameRow.project == row.project, SceneNameRow.name == name + STAGED, SceneNameRow.scene_id == row.id)
-    session.execute(delete(SceneNameRow).where(*staged))
+    scenes.mean(session, staged.project, name, scene_id, staged.configurations)
+    session.delete(staged)
     return done

@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 from certifier import stored
 from certifier.errors import CirisError
 from certifier.growth.actions import Finish
+from certifier.jobs.map import ways_of
 from certifier.map.options import MapOptions
 from certifier.model import Scene
 from certifier.names import MAX_NAME
@@ -90,6 +91,7 @@ class Map(Kind):
         for i, path in enumerate(given["paths"]):
             for j, q in enumerate(path):
                 check_positions(scene, q, f"options.paths[{i}][{j}]")
+        ways_of(scene, given["paths"])
         return {**asdict(read(MapOptions, given, "options")), "former": None if body.former is None else _former(body.former, db)}
 
     def decide(self, turn: Turn) -> Lead | Finish:

@@ -26,7 +26,7 @@ def find_contacts(body: ContactsRequest, db: Db) -> ContactsResponse:
     with db.read() as session:
         scene_id = scenes.find(session, body.scene)
     scene = scenes.load(db, scene_id)
-    body = with_positions(db, scene_id, scene, body)
+    body = with_positions(db, scene, body)
     return ContactsResponse(scene=scene_id, contacts=drawing.contacts(scene, checks.points(scene, body.q, "q")))
 
 
@@ -42,5 +42,5 @@ async def slice_space(body: SliceRequest, db: Db, libraries: KeptLibraries, chil
 
 def _slice(db: Database, libraries: Libraries, body: SliceRequest) -> SliceResponse:
     scene_id, scene, library = asked(db, libraries, body.scene)
-    body = with_positions(db, scene_id, scene, body)
+    body = with_positions(db, scene, body)
     return drawing.sliced(scene_id, scene, library, body)

@@ -29,5 +29,5 @@ def _certify(db: Database, body: MotionRequest) -> Any:
     with db.read() as session:
         scene_id = scenes.find(session, body.scene)
     scene = scenes.load(db, scene_id)
-    body = with_positions(db, scene_id, scene, body)
+    body = with_positions(db, scene, body)
     return about_motions("certify_in_child", scene, body.model_dump(mode="json", exclude={"scene"}))

@@ -51,7 +51,7 @@ router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ]
 def contains(body: ContainsRequest, db: Db, libraries: KeptLibraries, motions: KeptMotions, free_sets: KeptFreeSets) -> ContainsResponse:
     """Returns what proves each point free: certified regions with how deep inside it is, tubes of proved motions, the latest map."""
     scene_id, scene, library = asked(db, libraries, body.scene)
-    body = with_positions(db, scene_id, scene, body)
+    body = with_positions(db, scene, body)
     points = _points(scene, body.q, body.s)
     found = locate(library, points)
     tubes = motions.of(db, scene_id, scene).tubes
@@ -75,7 +75,7 @@ def contains(body: ContainsRequest, db: Db, libraries: KeptLibraries, motions: K
 def find_nearest(body: NearestRequest, db: Db, libraries: KeptLibraries) -> NearestResponse:
     """Returns, for each point, the nearest certified region of the scene, its nearest point and how far that is."""
     scene_id, scene, library = asked(db, libraries, body.scene)
-    body = with_positions(db, scene_id, scene, body)
+    body = with_positions(db, scene, body)
     points = _points(scene, body.q, body.s)
     found = [nearest(library, s) if np.isfinite(s).all() else None for s in points]
     points_found = [NearestPoint(nearest=answers.near(library, scene, near)) for near in found]
@@ -94,7 +94,7 @@ def cover_segments(
     One that is straight in `q` is proved piece by piece, with bounds on what lies between, so one that only touches may not be proved.
     """
     scene_id, scene, library = asked(db, libraries, body.scene)
-    body = with_positions(db, scene_id, scene, body)
+    body = with_positions(db, scene, body)
     proofs = library, motions.of(db, scene_id, scene).tubes, free_sets.of(db, scene_id)
     given, name = (body.q, "q") if body.q is not None else (body.s or [], "s")
     segments = [
@@ -112,7 +112,7 @@ def cover_path(body: PathRequest, db: Db, libraries: KeptLibraries, motions: Kep
     With `times` the path is a trajectory, and the answer is in its times. What `covered` means is said at `/v1/planning/segment`.
     """
     scene_id, scene, library = asked(db, libraries, body.scene)
-    body = with_positions(db, scene_id, scene, body)
+    body = with_positions(db, scene, body)
     found = _curve(scene, body)
     times = body.times or (np.arange(len(found.controls) // found.degree + 1.0) if found.times is None else found.times).tolist()
     proofs = library, motions.of(db, scene_id, scene).tubes, free_sets.of(db, scene_id)

@@ -9,6 +9,7 @@ from typing import Annotated, BinaryIO
 
 from cachetools import LRUCache, cached
 from fastapi import APIRouter, File, Path, Query, Response, UploadFile, status
+from sqlalchemy.orm import Session
 
 from api import drawing
 from api.access import READ, Admin, Db, Submitter
@@ -32,6 +33,7 @@ from api.schemas.scenes import (
 )
 from api.schemas.service import Dependents
 from api.writing import writing
+from certifier.errors import SceneError
 from certifier.model import Scene
 from certifier.names import MAX_NAME
 from certifier.pair.forecast import forecast
@@ -40,6 +42,8 @@ from certifier.scene.conditions import constrained, read_conditions, swept_in
 from certifier.verify import uncovered
 from db import audit, machine, retention, scenes, staging
 from db.audit import Action
+from db.models import Document, SceneRow
+from db.scenes import STAGED
 from db.session import Database
 
 KEPT = 8
@@ -93,7 +97,7 @@ def _add_scene(db: Database, room: Room, project: str, file: BinaryIO, stage: st
     besides = uncovered.document(scene)
     with db.write() as session:
         row = scenes.add(session, scene) if stage is None else staging.stage(session, stage, scene)
-        return SceneDetail.whole(row, scenes.names(session, [row.id])[row.id], scene, besides)
+        return _detail(session, row, row.name if stage is None else row.name + STAGED, scene, besides)
 
 
 @cached(LRUCache(KEPT), key=lambda data: hashlib.sha256(data).digest(), lock=Lock())
@@ -118,10 +122,17 @@ def list_scenes(db: Db, after: Cursor = None, limit: Listed = 100) -> ScenePage:
 def get_scene(scene_id: SceneGiven, db: Db) -> SceneDetail:
     """Returns one scene, by its id or by its name. A name means the scene that was last added under it or promoted."""
     with db.read() as session:
-        row = scenes.get(session, scene_id)
-        names = scenes.names(session, [row.id])[row.id]
-    scene = scenes.load(db, row.id)
-    return SceneDetail.whole(row, names, scene, uncovered.document(scene))
+        found = scenes.find(session, scene_id)
+    scene = scenes.load(db, found)
+    besides = uncovered.document(scene)
+    with db.read() as session:
+        return _detail(session, scenes.get(session, found), scene_id, scene, besides)
+
+
+def _detail(session: Session, row: SceneRow, given: str, scene: Scene, besides: Document) -> SceneDetail:
+    """Returns what there is to say of a scene, by the name or id that was given."""
+    known = scenes.known(session, given)
+    return SceneDetail.whole(row, scenes.names(session, [row.id])[row.id], scene, known, besides)
 
 
 @router.get("/{scene_id}/model")
@@ -189,14 +200,20 @@ async def constrain_scene(
 
 def _constrain(db: Database, room: Room, project: str, scene_id: str, body: ConstrainRequest) -> SceneDetail:
     room.check(db, project)
+    scenes.check_name(body.name, "name")
     with db.read() as session:
-        scene_id = scenes.find(session, scene_id)
-    base = scenes.load(db, scene_id)
-    scene = replace(constrained(base, read_conditions(body.conditions), swept_in(base)), name=body.name)
+        found, known = scenes.find(session, scene_id), scenes.known(session, scene_id)
+        named = scenes.meaning(session, body.name)
+    if named is not None and named.scene_id == found:
+        message = f"{body.name!r} is the name of the scene without these conditions"
+        raise SceneError("scene_name", message, field="name", hint="give the new scene a name of its own")
+    base = scenes.load(db, found)
+    more = constrained(base, read_conditions(body.conditions), swept_in(base))
+    scene = replace(more, name=body.name, configurations=known.agreed)
     besides = uncovered.document(scene)
     with db.write() as session:
         row = scenes.add(session, scene)
-        return SceneDetail.whole(row, scenes.names(session, [row.id])[row.id], scene, besides)
+        return _detail(session, row, body.name, scene, besides)
 
 
 @router.post("/{scene_name}/promote")

@@ -13,6 +13,7 @@ from certifier.model import JointKind, Scene
 from certifier.names import MAX_NAME
 from certifier.verify.uncovered import LISTED
 from db.models import SceneRow
+from db.scenes import Known
 from jobs.fields import Request
 
 
@@ -20,7 +21,7 @@ class SceneSummary(BaseModel):
     """Describes a scene in a list."""
 
     id: str = Field(description="Id of the scene.")
-    name: str = Field(description="The name that the scene was last added or staged under.")
+    name: str = Field(description="The name that was asked for, or the one that the scene was last added or staged under.")
     names: list[str] = Field(
         description="The names that mean this scene now, `NAME@staged` among them. A name means the scene that was last added under it or "
         "promoted, so a scene may have none or several."
@@ -128,14 +129,15 @@ class SceneDetail(SceneSummary):
     not_covered: NotCovered = Field(description="The pairs of geometries that no proof about the scene is about.")
     conditions: list[ConditionInfo] = Field(description="What holds beside collisions wherever something is proved.")
     configurations: dict[str, dict[str, float]] = Field(
-        description="The named configurations: positions of joints by their names, in radians or metres. A request takes such names in the "
+        description="The configurations that the scene has under the name that was asked for: positions of joints by their names, "
+        "in radians or metres. For an id they are those of all of its names that agree. A request takes the names of configurations in the "
         "place of joint positions, with commas between them; `q_star` stands for q* of the joints that the others leave open.",
         examples=[{"arm/manipulator/home": {"arm/shoulder": 0.4, "arm/elbow": 0.3}}],
     )
     provenance: Document = Field(description="What the scene was read from, and by which versions.")
 
     @classmethod
-    def whole(cls, row: SceneRow, names: list[str], scene: Scene, not_covered: Document) -> Self:
+    def whole(cls, row: SceneRow, names: list[str], scene: Scene, known: Known, not_covered: Document) -> Self:
         document = row.document
         moving = sorted((j for j in document["joints"] if j["index"] is not None and not j.get("follows")), key=lambda j: j["index"])
         positions = [
@@ -143,12 +145,12 @@ class SceneDetail(SceneSummary):
             for j, centre in zip(moving, document["q_star"], strict=True)
         ]
         return cls(
-            **SceneSummary.of(row, names).model_dump(),
+            **{**SceneSummary.of(row, names).model_dump(), "name": known.name},
             positions=positions,
             bodies=[body for body in document["bodies"] if not of_condition(body)],
             conditions=[ConditionInfo(name=one.name, kind=one.kind, statement=str(one)) for one in scene.conditions],
             padding=document["padding"],
-            configurations=document.get("configurations", {}),
+            configurations=known.agreed,
             not_covered=NotCovered.model_validate(not_covered),
             provenance=document["provenance"],
         )

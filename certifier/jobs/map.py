@@ -22,6 +22,7 @@ from certifier.map.trees import Pairs, Plan
 from certifier.model import Array, Scene
 from certifier.orphans import die_with_parent
 from certifier.proof.map import MapProof
+from certifier.seeding.limits import check_in_windows
 
 Tell = Callable[[str, dict[str, Any]], None]
 Work = Callable[[Sequence[Task]], Iterator[tuple[Task, Found]]]
@@ -104,7 +105,14 @@ def in_s(scene: Scene, at: Sequence[Sequence[float]]) -> Array:
 
 
 def ways_of(scene: Scene, paths: Sequence[Sequence[Sequence[float]]]) -> Array:
-    """Returns where the straight parts of motions begin and end, (W, 2, n) in q; ``paths`` has the waypoints of each motion."""
+    """Returns where the straight parts of motions begin and end, (W, 2, n) in q; ``paths`` has the waypoints of each motion.
+
+    Raises:
+        RegionError: ``seed_outside_window``, for a waypoint that is a turn away from where the scene has it.
+    """
+    for i, path in enumerate(paths):
+        for j, q in enumerate(path):
+            check_in_windows(scene, q, f"options.paths[{i}][{j}]")
     ways = [ends for path in paths for ends in pairwise(path)]
     return np.array(ways, dtype=float).reshape(-1, 2, scene.n)
 

@@ -8,7 +8,7 @@ The rounds are the same whatever the machine does, so the same effort gives the 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
+from itertools import pairwise, product
 from typing import NamedTuple
 
 import numpy as np
@@ -41,7 +41,7 @@ HAIR = 1e-8
 metres. Lookups need 1e-9 (ciris.free_set).
 """
 ON_WAYS = 512
-"""Before a round, this many configurations are drawn on the motions that were asked for. Those not proved yet weigh DEMAND in all."""
+"""Before a round, twice as many configurations are drawn on the motions that were asked for. Those not proved yet weigh DEMAND in all."""
 SIDES, BESIDE = 128, 20_000
 """At most SIDES configurations beside each one that was asked for are looked at, and about BESIDE beside all of them get cells."""
 
@@ -228,6 +228,7 @@ class Growing(Trees):
         first, held = self._free(FIRST), self._free(HELD)  # before there are trees, so that what a former map proves is among them
         self._add(first, 1.0)
         self._held = slice(len(first), len(first) + self._add(held, 0.0))
+        at = np.concatenate([at, scene.to_s(self._ways.reshape(-1, scene.n))])
         wanted = beside(scene, at[self._plan.free(at)], min(SIDES, max(1, BESIDE // max(1, len(at)))))
         sides = wanted.reshape(-1, scene.n)
         self._add(sides[self._plan.free(sides)], DEMAND / wanted.shape[1])
@@ -290,7 +291,7 @@ class Growing(Trees):
     def _draw(self) -> None:
         """Draws samples where the map is open: on the motions that are wanted, and anywhere if few are left there."""
         if len(self._ways):
-            on_ways = self._on_ways()
+            on_ways = self._beside(np.concatenate([self._on_ways(), self._on_cuts()]))
             self._add(on_ways, DEMAND / max(1, len(on_ways)))
         if np.count_nonzero((self._open > 0) & (self._value > 0)) < WANTED:
             self._add(self._drawn(BATCH), 1.0)
@@ -319,13 +320,40 @@ class Growing(Trees):
         return self._left(self._rng.uniform(self.scene.q_lower, self.scene.q_upper, size=(count, self.scene.n)))
 
     def _on_ways(self) -> Array:
-        """Draws configurations on the motions that are wanted, by their lengths, and returns those that are left, in s."""
+        """Draws joint positions on the motions that are wanted, by their lengths."""
         begin, way = self._ways[:, 0], self._ways[:, 1] - self._ways[:, 0]
         lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(way, axis=1))])
         at = lengths[-1] * (np.arange(ON_WAYS) + self._rng.uniform(size=ON_WAYS)) / ON_WAYS
         which = np.clip(np.searchsorted(lengths, at, side="right") - 1, 0, len(way) - 1)
         part = (at - lengths[which]) / np.maximum(np.diff(lengths)[which], np.finfo(float).tiny)
-        return self._left(begin[which] + np.clip(part, 0.0, 1.0)[:, None] * way[which])
+        found: Array = begin[which] + np.clip(part, 0.0, 1.0)[:, None] * way[which]
+        return found
+
+    def _on_cuts(self) -> Array:
+        """Draws joint positions where the motions that are wanted cross cuts. Two cells may touch there alone."""
+        trees = list(self.trees.values())
+        sizes = np.cumsum([0, *(tree.descent.size for tree in trees)])
+        drawn, which = self._rng.integers(max(1, sizes[-1]), size=ON_WAYS), self._rng.integers(len(self._ways), size=ON_WAYS)
+        found = []
+        for tree, (first, last) in zip(trees, pairwise(sizes), strict=True):
+            mine = (first <= drawn) & (drawn < last)
+            kinds, cuts = tree.descent.kinds[drawn[mine] - first], tree.descent.values[drawn[mine] - first]
+            inner = kinds >= 0
+            joints, (begin, end) = tree.pair.positions[kinds[inner]], self._ways[which[mine][inner]].swapaxes(0, 1)
+            at = np.zeros(begin.shape)
+            row = np.arange(len(at))
+            at[row, joints] = cuts[inner]
+            way = end - begin
+            with np.errstate(divide="ignore", invalid="ignore"):
+                part = (self.scene.to_q(at)[row, joints] - begin[row, joints]) / way[row, joints]
+            crossed = (part >= 0) & (part <= 1)
+            found.append(begin[crossed] + part[crossed, None] * way[crossed])
+        return np.concatenate([np.zeros((0, self.scene.n)), *found])
+
+    def _beside(self, q: Array) -> Array:
+        """Returns joint positions a hair beside others, (S, n), which may lie on cuts, as far as they are left, in s."""
+        signs = self._rng.choice((1.0, -1.0), q.shape)
+        return self._left(np.clip(q + HAIR * signs, self.scene.q_lower, self.scene.q_upper))
 
     def _left(self, q: Array) -> Array:
         """Returns those of joint positions, (S, n), that are free of collision, and that the map does not prove yet, in s."""

@@ -16,7 +16,7 @@ import yaml
 
 from certifier.configurations import Q_STAR, is_configuration_name
 from certifier.errors import SceneError
-from certifier.names import ALPHABET
+from certifier.names import ALPHABET, SCENE_ALPHABET, is_scene_name
 from certifier.scene import fields
 from certifier.scene.conditions import ConditionEntry, read_conditions
 from certifier.scene.directives import added_files, check_directives, replaced, resolved
@@ -116,8 +116,7 @@ def read_scene_file(path: Path) -> SceneFile:
         SceneError: ``scene_not_found``, ``scene_yaml`` (not YAML, with the line) or ``scene_field`` (with the field).
     """
     text = _text(path)
-    root = compose(text, path.name)
-    nodes = _mapping(root, path.name)
+    nodes = _mapping(compose(text, path.name), path.name, KEYS)
     if "directives" not in nodes:
         raise fields.wrong("directives", "is missing", hint="a list of Drake Model Directives that adds the robot and its surroundings")
     values: dict[str, Any] = {key: fields.construct(node, key) for key, node in nodes.items() if key != "directives"}
@@ -130,7 +129,7 @@ def read_scene_file(path: Path) -> SceneFile:
     _check_directives(directives, path.name)
     return SceneFile(
         path=path,
-        name=fields.name(values.get("name", path.parent.name if path.stem == "scene" else path.stem), "name"),
+        name=_scene_name(values.get("name", path.parent.name if path.stem == "scene" else path.stem)),
         packages=_packages(values.get("packages", {}), path.parent),
         directives=text[directives.start_mark.index : directives.end_mark.index].rstrip(),
         resolved_directives=resolved(text, directives, path.parent),
@@ -154,12 +153,12 @@ def read_scene_file(path: Path) -> SceneFile:
 
 
 def read_condition_file(path: Path) -> list[dict[str, Any]]:
-    """Returns the ``conditions`` of a file that has them as a scene file has them. Other keys of scene files do not count.
+    """Returns the ``conditions`` of a file that has them as a scene file has them, and nothing else.
 
     Raises:
         SceneError: as :func:`read_scene_file`.
     """
-    nodes = _mapping(compose(_text(path), path.name), path.name)
+    nodes = _mapping(compose(_text(path), path.name), path.name, ("conditions",))
     if "conditions" not in nodes:
         raise fields.wrong("conditions", f"is missing in {path.name}", hint="write conditions, as docs/conditions.md shows them")
     found: list[dict[str, Any]] = fields.construct(nodes["conditions"], "conditions")
@@ -183,17 +182,18 @@ def existing(path: str | Path) -> Path:
 
 def _text(path: Path) -> str:
     try:
-        data = path.read_bytes()
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
     except OSError:
         raise SceneError("scene_not_found", f"the file {path} cannot be read", hint="is it there, and may you read it?") from None
     if len(data) > MAX_BYTES:
-        raise SceneError("scene_yaml", f"{path.name} has {len(data)} bytes; a scene file may have at most {MAX_BYTES}")
+        raise SceneError("scene_yaml", f"{path.name} is too long: a scene file may have at most {MAX_BYTES} bytes")
     return decoded(data, path.name)
 
 
-def _mapping(node: yaml.Node | None, name: str) -> dict[str, yaml.Node]:
+def _mapping(node: yaml.Node | None, name: str, known: tuple[str, ...]) -> dict[str, yaml.Node]:
     if not isinstance(node, yaml.MappingNode):
-        raise fields.wrong("", f"{name} must be a mapping of name, directives and so on")
+        raise fields.wrong("", f"{name} must be a mapping with the keys {', '.join(known)}")
     found: dict[str, yaml.Node] = {}
     for key, value in node.value:
         if not isinstance(key, yaml.ScalarNode):
@@ -201,8 +201,14 @@ def _mapping(node: yaml.Node | None, name: str) -> dict[str, yaml.Node]:
         if key.value in found:
             raise fields.twice(str(key.value), key)
         found[key.value] = value
-    fields.check_known(found, "", KEYS)
+    fields.check_known(found, "", known)
     return found
+
+
+def _scene_name(value: Any) -> str:
+    if not is_scene_name(value):
+        raise fields.wrong("name", f"must be a name of a scene, not {value!a}"[:200], hint=f"names have {SCENE_ALPHABET}")
+    return str(value)
 
 
 def _packages(value: Any, directory: Path) -> dict[str, Path]:

@@ -30,10 +30,21 @@ def check_limits(scene: Scene, q: ArrayLike, field: str = "seed") -> None:
             message = f"joint {joint.name} is at {value:.9g}, not between its limits {own_lower:.9g} and {own_upper:.9g}"
             raise RegionError("seed_outside_limits", message, field=f"{field}[{i}]", hint="move it between them")
         if not scene.q_lower[i] - ON <= shifted[i] <= scene.q_upper[i] + ON:
-            message = (
-                f"joint {joint.name} is at {value:g}, outside of the window from {joint.lower:g} to {joint.upper:g} that the scene covers"
-            )
+            window = f"the window from {joint.lower:.9g} to {joint.upper:.9g}"
+            message = f"joint {joint.name} is at {value:.9g}, outside of {window} that the scene covers"
             raise RegionError("seed_outside_window", message, field=f"{field}[{i}]", hint=f"set q_star of this joint to about {value:.3g}")
+
+
+def check_in_windows(scene: Scene, q: ArrayLike, field: str) -> None:
+    """Refuses a configuration that is whole turns away from where the scene has it: a straight motion to it would go elsewhere.
+
+    Raises:
+        RegionError: ``seed_outside_window``; the error names the joint.
+    """
+    values, shifted = np.asarray(q, dtype=float), scene.in_windows(q, field)
+    for i in np.flatnonzero(np.abs(values - shifted) > ON)[:1]:
+        message = f"joint {scene.moving[i].name} is at {values[i]:.9g}, whole turns away from where the scene has it"
+        raise RegionError("seed_outside_window", message, field=f"{field}[{i}]", hint=f"write {shifted[i]:.9g}")
 
 
 def off_limits(scene: Scene, q: ArrayLike) -> Array:

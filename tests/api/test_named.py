@@ -121,3 +121,46 @@ def test_the_scene_lists_its_configurations_and_the_last_ones_hold(client: TestC
     assert ask(client, "/v1/planning/contains", q=["home"])["code"] == "unknown_configuration"
     named()
     assert listed() == {}
+
+
+@pytest.fixture
+def other(database: Database, named: object, scene: Scene) -> str:
+    """Adds the scene of the region under another name, where home is elsewhere and away is not known. Returns its id."""
+    (joint,) = (joint.name for joint in scene.moving)
+    with database.write() as session:
+        return scenes.add(session, replace(scene, name="other", configurations={"home": {joint: 0.1}, "rest": {joint: 0.0}})).id
+
+
+def test_each_name_of_a_scene_has_its_own_configurations(client: TestClient, other: str) -> None:
+    assert [client.get(f"/v1/scenes/{name}").json()["id"] for name in ("slider", "other")] == [other, other]
+    homes = {name: client.get(f"/v1/scenes/{name}").json()["configurations"] for name in ("slider", "other", other)}
+    assert [sorted(found) for found in homes.values()] == [["away", "home"], ["home", "rest"], ["away", "rest"]]
+    for name in ("slider", f"slider@{other}"):
+        assert ask(client, "/v1/planning/contains", scene=name, q=["home"]) == ask(client, "/v1/planning/contains", q=[[HOME]])
+        assert ask(client, "/v1/planning/contains", scene=name, q=["rest"])["code"] == "unknown_configuration"
+    for name in ("other", f"other@{other}"):
+        assert ask(client, "/v1/planning/contains", scene=name, q=["home"]) == ask(client, "/v1/planning/contains", q=[[0.1]])
+    refused = ask(client, "/v1/planning/contains", scene=other, q=["rest", "home"])
+    assert (refused["code"], refused["field"]) == ("configuration", "q[1]")
+    assert all(name in refused["detail"] for name in ("'home'", "'slider'", "'other'")), refused
+    assert ask(client, "/v1/planning/contains", scene=other[:8], q=["rest", "away"])["status"] == 200
+    assert ask(client, "/v1/planning/contains", scene=f"third@{other}", q=["rest"])["code"] == "scene_not_found"
+
+
+def test_a_constrained_scene_keeps_the_configurations(client: TestClient, other: str) -> None:
+    (joint,) = (position["name"] for position in client.get("/v1/scenes/slider").json()["positions"])
+    low = {"name": "low", "inside": {"what": [client.get("/v1/scenes/slider").json()["bodies"][-1]], "half_spaces": [[0, 0, 1, 9]]}}
+    for name, expected in (("slider", {"home": HOME, "away": AWAY}), ("other", {"home": 0.1, "rest": 0.0})):
+        made = client.post(f"/v1/scenes/{name}/constrain", json={"name": f"low-{name}", "conditions": [low]})
+        assert made.status_code == 201, made.text
+        assert made.json()["configurations"] == {one: {joint: value} for one, value in expected.items()}
+    refused = client.post("/v1/scenes/slider/constrain", json={"name": "other", "conditions": [low]})
+    assert (refused.status_code, refused.json()["code"], refused.json()["field"]) == (422, "scene_name", "name")
+
+
+@pytest.mark.parametrize("name", ["a\x1b[2Jb", "", " a", "../x", "a/..", "0123456789abcdef", "0f" * 32, "é", "a" * 201])
+def test_a_scene_has_a_name_that_harms_nobody(client: TestClient, region: str, name: str) -> None:
+    low = {"name": "low", "inside": {"what": [client.get("/v1/scenes/slider").json()["bodies"][-1]], "half_spaces": [[0, 0, 1, 9]]}}
+    refused = client.post("/v1/scenes/slider/constrain", json={"name": name, "conditions": [low]})
+    assert (refused.status_code, refused.json()["field"]) == (422, "name"), refused.text
+    assert "\x1b" not in refused.json()["detail"]

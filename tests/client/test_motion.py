@@ -10,6 +10,7 @@ import pytest
 
 from certifier.errors import RegionError
 from certifier.model import Scene
+from client import number_files
 from client.path_files import path_file
 from tests.client.conftest import PLANAR, Ciris
 
@@ -166,7 +167,7 @@ def test_files_of_curves_say_the_same(tmp_path: Path) -> None:
     ("name", "content", "words"),
     [
         ("a.txt", "0 0", "neither .npz"),
-        ("a.json", "[1]", "no JSON file"),
+        ("a.json", "[1]", "it must be a mapping"),
         ("a.json", '{"x": [[1]]}', "either q or s"),
         ("a.json", '{"q": [[1]], "bezier": [[[1], [2]]]}', "either q or s, or one curve"),
         ("a.json", '{"knots": [0, 0, 1, 1]}', "either q or s, or one curve"),
@@ -175,10 +176,18 @@ def test_files_of_curves_say_the_same(tmp_path: Path) -> None:
         ("a.json", '{"bezier": [[[0], [1]], [[1]]]}', "no JSON file"),
         ("a.json", '{"q": [[1]], "s": [[1]]}', "either q or s"),
         ("a.json", '{"q": [[1], [2]], "t": [1, 1]}', "ascending"),
-        ("a.json", '{"q": [[1], ["x"]]}', "no JSON file"),
+        ("a.json", '{"q": [[1], ["x"]]}', "q[1][0] must be a finite number, not 'x'"),
+        ("a.json", '{"q": [[1], ["2"]]}', "q[1][0] must be a finite number, not '2'"),
+        ("a.json", '{"q": [[1], [true]]}', "q[1][0] must be a finite number, not 'True'"),
+        ("a.json", '{"q": ["home", ["2"]]}', "q[1][0] must be a finite number, not '2'"),
+        ("a.json", '{"s": [[1], [NaN]]}', "s[1][0] must be a finite number, not 'nan'"),
+        ("a.yaml", "q: [[1], [.inf]]", "q[1][0] must be a finite number, not 'inf'"),
+        ("a.yaml", "q: [[1], ['1_0']]", "q[1][0] must be a finite number, not '1_0'"),
+        ("a.csv", "0,0\n0,nan\n", "waypoint 1: 'nan' is no finite number"),
+        ("a.csv", "0,0\n0,1_0\n", "waypoint 1: '1_0' is no finite number"),
         ("a.npz", "x", "no npz file"),
         ("a.yaml", "q: [", "no YAML file"),
-        ("a.csv", "0,0\n0,x\n", "waypoint 1: 'x' is no number"),
+        ("a.csv", "0,0\n0,x\n", "waypoint 1: 'x' is no finite number"),
         ("a.csv", "0,0\n0\n", "waypoint 1: it must have 2 numbers"),
         ("a.csv", "", "no CSV file"),
         ("a.csv", "elbow,shoulder\n0,0\n0,1\n", "their names elbow, shoulder are not looked up"),
@@ -192,3 +201,18 @@ def test_a_bad_file_is_refused_with_what_is_wrong(tmp_path: Path, name: str, con
         path_file(str(tmp_path / name))
     assert words in str(refusal.value)
     assert refusal.value.field == "--path"
+
+
+def test_numbers_that_are_not_finite_are_refused_in_arrays(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", q=[[0.0], [np.nan]])
+    with pytest.raises(RegionError, match="q has numbers that are not finite"):
+        path_file(str(tmp_path / "a.npz"))
+
+
+@pytest.mark.parametrize("suffix", ["csv", "json", "yaml"])
+def test_a_file_without_an_end_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str) -> None:
+    monkeypatch.setattr(number_files, "LARGEST", 1000)
+    endless = tmp_path / f"a.{suffix}"
+    endless.symlink_to("/dev/zero")
+    with pytest.raises(RegionError, match="it has more than 1000 bytes"):
+        path_file(str(endless))

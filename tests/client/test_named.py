@@ -60,7 +60,7 @@ def test_files_with_waypoints_have_names(ciris: Ciris, url: str, named: Scene, t
     file.write_text(json.dumps({"q": ["home", "nowhere"]}))
     refused = ciris("path", "slider", "--path", file, CIRIS_URL=url)
     assert refused.error.startswith("--path[1]: the scene has no configuration 'nowhere'")
-    for rows, problem in ((["home", "away"], "t of"), (["home", {"a": 1}], "file of numbers")):
+    for rows, problem in ((["home", "away"], "t of"), (["home", {"a": 1}], "q[1] must be a finite number")):
         file.write_text(json.dumps({"q": rows, "t": [0]}))
         assert problem in ciris("path", "slider", "--path", file, CIRIS_URL=url).error
 
@@ -99,6 +99,11 @@ def test_requests_of_the_python_client_have_names_where_they_were_given() -> Non
         ("2nd pose", "2nd pose"),
         ("0, 0.3,-1.8", [0.0, 0.3, -1.8]),
         ("0 0.3", [0.0, 0.3]),
+        ("[0, 0.3]", [0.0, 0.3]),
+        ("[home]", "[home]"),
+        ("0,1_0", None),
+        ("0,\u0663", None),
+        ("[0, 0.3", None),
         ("home,0", None),
         ("0,home", None),
         ("", None),

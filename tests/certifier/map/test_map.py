@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from certifier.errors import ProofError
-from certifier.jobs.map import _adopted, grow_map, grow_round
+from certifier.jobs.map import _adopted, grow_map, grow_round, ways_of
 from certifier.map.free_set import as_file, free_set
 from certifier.map.growing import Growing
 from certifier.map.trees import Plan
@@ -234,6 +235,27 @@ def test_a_motion_that_is_wanted_comes_first():
         for ways in (late[None], None)
     ]
     assert efforts[0] < 0.5 * efforts[1]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        [[0.5, 0.4], [0.0, 0.0], [0.5, -0.4]],
+        [[0.4, 0.4], [-0.4, -0.4]],
+        [[0.0, 0.5], [0.0, -0.5]],
+        [[0.0, 0.0], [0.0, 0.0]],
+        [[0.5, 0.0], [0.5, 0.0], [0.25, 0.0]],
+    ],
+    ids=["turns on a cut", "crosses a corner of cells", "runs along a cut", "stays on a cut", "waits, and runs along a cut"],
+)
+def test_a_motion_that_is_wanted_is_proved_on_all_sides_of_cuts(path):
+    """Cells are halved, so there are cuts at 0."""
+    scene, path = planar_arm(2, CROWDED), np.array(path)
+    t = np.linspace(0.0, 1.0, 400)[:, None]
+    samples = np.concatenate([a + t * (b - a) for a, b in pairwise(path)])
+    assert Plan(scene).free(scene.to_s(samples)).all()
+    growing = Growing(scene, np.zeros((0, 2)), ways=ways_of(scene, [path.tolist()]))
+    grown_until(growing, lambda growing: share_of(growing, path) == 1.0)
 
 
 def share_of(growing, path):
