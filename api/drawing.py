@@ -195,9 +195,7 @@ def sliced(scene_id: str, scene: Scene, library: Library, body: SliceRequest) ->
 def _joint(scene: Scene, name: str, field: str) -> int:
     names = [joint.name for joint in scene.moving]
     if name not in names:
-        raise RegionError(
-            "unknown_joint", f"no joint of {scene.name} is called {name!r}", field=field, hint=f"there are {', '.join(names)}"
-        )
+        raise RegionError("unknown_joint", f"no joint of the scene is called {name!r}", field=field, hint=f"there are {', '.join(names)}")
     return names.index(name)
 
 

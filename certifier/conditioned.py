@@ -16,7 +16,19 @@ from itertools import product
 
 import numpy as np
 
-from certifier.conditions import MODEL, Condition, Cone, Distance, Inside, Range, condition_named, of_condition
+from certifier.conditions import (
+    MODEL,
+    NAMED,
+    TURNING,
+    Condition,
+    Cone,
+    Distance,
+    Inside,
+    Range,
+    condition_named,
+    is_condition_name,
+    of_condition,
+)
 from certifier.errors import SceneError
 from certifier.model import WORLD, Array, Geometry, Joint, JointKind, Pair, Scene
 from certifier.names import escaped, is_name
@@ -42,8 +54,6 @@ MOST_TURNS = 10
 """The lower angle of a range is at most this many turns, so that ROOM is far above what doubles round in it."""
 UNIT = 1e-12
 """The length of a direction differs from 1 by less than this."""
-TURNING = "turning"
-"""No condition has this name, which copies of bodies have that only turn."""
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 
 
@@ -107,8 +117,8 @@ def _check(scene: Scene, condition: Condition) -> None:
     Raises:
         SceneError: ``condition``.
     """
-    if not is_name(condition.name) or "/" in condition.name or condition.name == TURNING:
-        raise _wrong(condition, f"it needs a name without a slash, which is not {TURNING!r}")
+    if not is_condition_name(condition.name):
+        raise _wrong(condition, NAMED)
     match condition:
         case Cone():
             _check_bodies(scene, condition, condition.body, condition.of)

@@ -11,11 +11,16 @@ from dataclasses import asdict, dataclass
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from certifier.names import is_name
+
 if TYPE_CHECKING:  # The command reads scene files without numpy, which documents need.
     from certifier.document import Node
 
 MODEL = "conditions"
 """Bodies and geometries that stand for conditions have names that begin with this and a slash."""
+TURNING = "turning"
+"""No condition has this name, which copies of bodies have that only turn."""
+NAMED = f"needs a name without a slash, and other than {TURNING!r}"
 
 DIGITS, NEARLY = 9, 1e-13
 """Statements give numbers to DIGITS digits, rounded to the safe side; a part NEARLY of a number is not seen."""
@@ -28,6 +33,11 @@ _OF_A_BOX = ([1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]
 def of_condition(name: str) -> bool:
     """Says whether a joint, a body or a geometry stands for a condition, by its name."""
     return name.startswith(f"{MODEL}/")
+
+
+def is_condition_name(text: object) -> bool:
+    """Returns whether a condition may have this name: as :func:`certifier.names.is_name`, without a slash, and not ``turning``."""
+    return is_name(text) and "/" not in str(text) and text != TURNING
 
 
 def condition_named(*names: str) -> str | None:

@@ -3,6 +3,14 @@
 import difflib
 from functools import partial
 
+LONGEST = 1000
+"""What an error says is cut in the middle where it is longer: it may contain a name that a user gave."""
+
+
+def shortened(text: str) -> str:
+    """Returns a text without its middle, where it is longer than LONGEST."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 500]} [...] {text[-400:]}"
+
 
 class CirisError(Exception):
     """This error reports a problem that the user can mend.
@@ -15,7 +23,7 @@ class CirisError(Exception):
 
     def __init__(self, code: str, message: str, *, field: str | None = None, hint: str = "") -> None:
         super().__init__(message)
-        self.code, self.message, self.field, self.hint = code, message, field, hint
+        self.code, self.message, self.field, self.hint = code, shortened(message), field and shortened(field), shortened(hint)
 
     def __str__(self) -> str:
         where = f"{self.field}: " if self.field else ""

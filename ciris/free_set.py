@@ -200,8 +200,8 @@ class FreeSet(InSpace):
             outside = np.flatnonzero((q < self.space.q_lower) | (q > self.space.q_upper))
             if len(outside):
                 i = outside[0]
-                hint = f"its limits are {self.space.q_lower[i]:.6g} and {self.space.q_upper[i]:.6g}"
-                raise RegionError("outside_limits", f"{self.joints[i]} is {q[i]:.6g}, beyond its limits", field=field, hint=hint)
+                hint = f"its limits are {self.space.q_lower[i]:.9g} and {self.space.q_upper[i]:.9g}"
+                raise RegionError("outside_limits", f"{self.joints[i]} is {q[i]:.9g}, beyond its limits", field=field, hint=hint)
         return rows[0], ends[0]
 
     def _ends(self, start: ArrayLike, end: ArrayLike) -> tuple[Array, Array, Array]:

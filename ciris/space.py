@@ -65,9 +65,9 @@ class Space:
         if outside.any():
             *at, joint = np.argwhere(outside)[0]
             value, centre = positions[(*at, joint)], self.q_star[joint]
-            message = f"{self.joints[joint]} is {value:.6g} rad, which is half a turn or more from q* = {centre:.6g} rad"
+            message = f"{self.joints[joint]} is {value:.9g} rad, which is half a turn or more from q* = {centre:.9g} rad"
             raise RegionError(
-                "outside_window", message, field="q", hint=f"its limits are {self.q_lower[joint]:.6g} and {self.q_upper[joint]:.6g} rad"
+                "outside_window", message, field="q", hint=f"its limits are {self.q_lower[joint]:.9g} and {self.q_upper[joint]:.9g} rad"
             )
         return np.where(self.revolute, np.tan(delta / 2), delta)
 

@@ -16,7 +16,7 @@ def check_length(scene: Scene, values: Sequence[float], field: str, code: str) -
         RegionError: ``code``, at ``field``.
     """
     if len(values) != scene.n:
-        message = f"{len(values)} numbers were given; {scene.name} has {scene.n} joints"
+        message = f"{len(values)} numbers were given; the scene has {scene.n} joints"
         raise RegionError(code, message, field=field, hint=scene.in_order)
 
 

@@ -75,7 +75,7 @@ def curved(scene: Scene, found: Curve, space: Space, field: str = "bezier") -> M
         piece = min(int(i) // found.degree, motion.pieces - 1)
         k = int(i) - piece * found.degree
         place = f"control point {k} of Bezier piece {piece}"
-        problem = f"joint {scene.moving[j].name} is at {found.controls[i, j]:.6g} in {place}, not between {lower[j]:.6g} and {upper[j]:.6g}"
+        problem = f"joint {scene.moving[j].name} is at {found.controls[i, j]:.9g} in {place}, not between {lower[j]:.9g} and {upper[j]:.9g}"
         hint = "all control points must be within the limits, as then all of the motion is; divide a piece whose own are far out"
         raise RegionError("outside_limits", problem, field=f"bezier[{piece}][{k}][{j}]" if field == "bezier" else field, hint=hint)
     return motion
@@ -116,5 +116,5 @@ def _check_limits(scene: Scene, points: Array, bounds: tuple[Array, Array], fiel
     if len(outside):
         i, j = outside[0]
         name = scene.moving[j].name
-        problem = f"joint {name} is at {points[i, j]:.6g} in waypoint {i}, not between {lower[j]:.6g} and {upper[j]:.6g}"
+        problem = f"joint {name} is at {points[i, j]:.9g} in waypoint {i}, not between {lower[j]:.9g} and {upper[j]:.9g}"
         raise RegionError("outside_limits", problem, field=f"{field}[{i}][{j}]", hint="move it between them; waypoints count from 0")

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from certifier.conditions import Condition, Cone, Distance, Inside, Range
+from certifier.conditions import NAMED, Condition, Cone, Distance, Inside, Range, is_condition_name
 from certifier.errors import SceneError
 from certifier.scene import fields
 from certifier.scene.known import check_known, names_of
@@ -50,6 +50,8 @@ def read_conditions(value: Any) -> tuple[ConditionEntry, ...]:
         if "name" not in given:
             raise fields.wrong(f"{where}.name", "is missing", hint="give each condition a name, which statements use")
         name = fields.name(given["name"], f"{where}.name")
+        if not is_condition_name(name):
+            raise fields.wrong(f"{where}.name", NAMED)
         kinds = [kind for kind in KEYS if kind in given]
         if len(kinds) != 1:
             raise fields.wrong(where, f"must have one of {', '.join(KEYS)}")
@@ -71,7 +73,11 @@ def constrained(scene: Scene, entries: Sequence[ConditionEntry], swept: Collecti
     """
     from certifier.conditioned import with_conditions, without_conditions
 
-    base = without_conditions(scene)
+    base, own = without_conditions(scene), {one.name for one in scene.conditions}
+    for i, entry in enumerate(entries):
+        if entry.name in own:
+            problem = f"{entry.name} is the name of a condition that the scene has"
+            raise fields.wrong(f"conditions[{i}].name", problem, hint="give each its own name")
     try:
         return with_conditions(base, [*scene.conditions, *(condition(entry, base, swept) for entry in entries)])
     except SceneError as error:
@@ -114,7 +120,9 @@ def condition(entry: ConditionEntry, scene: Scene, swept: Collection[str]) -> Co
             of = _body(said.get("of", WORLD), f"{where}.of", scene)
             _check_not_swept(of, f"{where}.of", scene, swept)
             named = [name for i, one in enumerate(what) for name in _geometries(one, f"{where}.what[{i}]", scene)]
-            return Inside(entry.name, tuple(dict.fromkeys(named)), of, _zone(said, where))
+            zone = _zone(said, where)
+            _check_room(zone, where)
+            return Inside(entry.name, tuple(dict.fromkeys(named)), of, zone)
         case Distance.kind:
             between = said.get("between")
             if not isinstance(between, list) or len(between) != 2:
@@ -177,6 +185,16 @@ def _zone(said: Mapping[str, Any], where: str) -> tuple[tuple[float, float, floa
         normal = _direction(row[:3], place)
         found.append((*normal, fields.number(row[3], f"{place}[3]") / math.hypot(*row[:3])))
     return tuple(found)
+
+
+def _check_room(zone: Sequence[tuple[float, float, float, float]], where: str) -> None:
+    """Refuses faces between which nothing is."""
+    from scipy.optimize import linprog
+
+    normals, offsets = [[*face[:3], 1.0] for face in zone], [face[3] for face in zone]
+    found = linprog([0, 0, 0, -1], normals, offsets, bounds=[(None, None)] * 3 + [(None, 1.0)])  # the largest ball, of at most a metre
+    if found.status == 0 and found.x[3] <= 0:
+        raise fields.wrong(f"{where}.half_spaces", "leave no room between them", hint="each says a x + b y + c z <= d")
 
 
 def _point(value: Any, where: str) -> tuple[float, float, float]:

@@ -156,11 +156,19 @@ def read_condition_file(path: Path) -> list[dict[str, Any]]:
     """Returns the ``conditions`` of a file that has them as a scene file has them, and nothing else.
 
     Raises:
-        SceneError: as :func:`read_scene_file`.
+        SceneError: as :func:`read_scene_file`; the field begins with the file.
     """
+    try:
+        return _conditions_in(path)
+    except SceneError as error:
+        error.field = f"{path.name}: {error.field}" if error.field else path.name
+        raise
+
+
+def _conditions_in(path: Path) -> list[dict[str, Any]]:
     nodes = _mapping(compose(_text(path), path.name), path.name, ("conditions",))
     if "conditions" not in nodes:
-        raise fields.wrong("conditions", f"is missing in {path.name}", hint="write conditions, as docs/conditions.md shows them")
+        raise fields.wrong("conditions", "is missing", hint="write conditions, as docs/conditions.md shows them")
     found: list[dict[str, Any]] = fields.construct(nodes["conditions"], "conditions")
     read_conditions(found)
     return found
@@ -193,7 +201,7 @@ def _text(path: Path) -> str:
 
 def _mapping(node: yaml.Node | None, name: str, known: tuple[str, ...]) -> dict[str, yaml.Node]:
     if not isinstance(node, yaml.MappingNode):
-        raise fields.wrong("", f"{name} must be a mapping with the keys {', '.join(known)}")
+        raise fields.wrong("", f"{name} must be a mapping with the {'keys' if known[1:] else 'key'} {', '.join(known)}")
     found: dict[str, yaml.Node] = {}
     for key, value in node.value:
         if not isinstance(key, yaml.ScalarNode):

@@ -92,7 +92,7 @@ def narrowed(joints: Sequence[Joint], limits: Mapping[str, tuple[float, float]],
     for name, (lower, upper) in given.items():
         own_lower, own_upper = range_of(by_name[name])
         if lower < own_lower - EXACT or upper > own_upper + EXACT:
-            message = f"{lower:g} to {upper:g} is not within the joint's own limits, {own_lower:g} to {own_upper:g}"
+            message = f"{lower:.9g} to {upper:.9g} is not within the joint's own limits, {own_lower:.9g} to {own_upper:.9g}"
             raise SceneError("scene_field", message, field=f"limits.{name}", hint="scene files can only make limits narrower")
     return [replace(j, lower=given[j.name][0], upper=given[j.name][1]) if j.name in given else j for j in joints]
 
@@ -141,7 +141,7 @@ def _windowed(joint: Joint, center: float) -> Joint:
     """Returns a joint with a window where its limits reach half a turn from the centre, or nearly."""
     lower, upper = range_of(joint)
     if lower >= upper:
-        message = f"joint {joint.name} cannot move: its limits are {lower:g} and {upper:g}"
+        message = f"joint {joint.name} cannot move: its limits are {lower:.9g} and {upper:.9g}"
         raise SceneError("joint_range", message, field="directives", hint=f"hold it by fix: {{{joint.name}: {lower:g}}}")
     if joint.kind is not JointKind.REVOLUTE:
         if not (np.isfinite(lower) and np.isfinite(upper)):
@@ -193,7 +193,7 @@ def _known(name: str, joints: Mapping[str, Joint], field: str, leaders: Mapping[
 def _check_within(joint: Joint, value: float) -> None:
     lower, upper = range_of(joint)
     if not lower - EXACT <= value <= upper + EXACT:
-        message = f"{value:g} is not within the joint's limits, {lower:g} to {upper:g}"
+        message = f"{value:.9g} is not within the joint's limits, {lower:.9g} to {upper:.9g}"
         raise SceneError("scene_field", message, field=f"fix.{joint.name}", hint="hold it within them")
 
 

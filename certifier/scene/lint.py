@@ -94,7 +94,7 @@ def _several(group: list[Geometry], size: Callable[[Geometry], float]) -> str:
 def _windows(scene: Scene) -> list[str]:
     """Returns a finding about every joint of which the scene covers a window."""
     return [
-        f"joint {j.name} may turn 179 degrees from q* and farther: the scene covers {lower:.6g} to {upper:.6g} degrees"
+        f"joint {j.name} may turn 179 degrees from q* and farther: the scene covers {lower:.9g} to {upper:.9g} degrees"
         for j, lower, upper in zip(scene.moving, np.degrees(scene.q_lower), np.degrees(scene.q_upper), strict=True)
         if j.own_limits is not None
     ]
@@ -103,7 +103,7 @@ def _windows(scene: Scene) -> list[str]:
 def _off_center(scene: Scene) -> list[str]:
     """Returns a finding about every joint whose q* is outside of its own limits."""
     return [
-        f"q_star of joint {j.name} is {center:.6g}, which is not within its limits, {lower:.6g} to {upper:.6g}"
+        f"q_star of joint {j.name} is {center:.9g}, which is not within its limits, {lower:.9g} to {upper:.9g}"
         for j, center, lower, upper in zip(scene.moving, scene.q_star, *scene.own_limits, strict=True)
         if not lower <= center <= upper
     ]

@@ -80,7 +80,7 @@ def test_a_scene_becomes_another_one_with_more_conditions(client: TestClient, up
     assert client.get("/v1/scenes/planar").json()["hash"] == upright.hash
     assert client.get("/v1/scenes/lower").json()["id"] == told["id"]
     again = client.post("/v1/scenes/lower/constrain", json={"name": "lowest", "conditions": [below]})
-    assert (again.status_code, again.json()["code"], again.json()["field"]) == (422, "condition", "conditions")
+    assert (again.status_code, again.json()["code"], again.json()["field"]) == (422, "scene_field", "conditions[0].name")
     for conditions, field in (
         ([{"name": "c", "cone": {"body": "arm/link2", "axis": [1, 0, 0], "along": [1, 0, 0], "degrees": 200}}], "conditions[0].cone"),
         ([{"name": "c", "cone": {"body": "arm/hand", "axis": [1, 0, 0], "along": [1, 0, 0], "degrees": 20}}], "conditions[0].cone.body"),

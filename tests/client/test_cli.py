@@ -176,8 +176,8 @@ def test_a_polytope_may_be_a_document(ciris: Ciris, files: Path) -> None:
     Path("poly.txt").write_text("1 2 3")
     for name, words in (
         ("broken.json", "is no JSON file of numbers"),
-        ("list.yaml", "is no YAML file of numbers"),
-        ("words.yaml", "is no YAML file of numbers"),
+        ("list.yaml", "list.yaml: it must be a mapping"),
+        ("words.yaml", "words.yaml: C must be a finite number, not 'hello'"),
         ("poly.txt", "is neither .npz nor .json nor .yaml"),
     ):
         done = ciris("certify", PLANAR, "--polytope", name, "--local")
@@ -389,7 +389,7 @@ def test_a_scene_of_the_service_gets_conditions(ciris: Ciris, url: str, scene: S
     assert ciris("scene", "show", "low-slider", "--json", CIRIS_URL=url).json["conditions"][0]["name"] == "low"
     (tmp_path / "none.yaml").write_text("name: low\n")
     wrong = ciris("scene", "constrain", "slider", "none.yaml", "--name", "x", CIRIS_URL=url)
-    assert (wrong.status, wrong.error.startswith("conditions: is missing in none.yaml")) == (2, True)
+    assert (wrong.status, wrong.error.startswith("none.yaml: name: is not a key of a scene file")) == (2, True)
     gone = ciris("scene", "constrain", "slider", "gone.yaml", "--name", "x", CIRIS_URL=url)
     assert (gone.status, "the file gone.yaml cannot be read" in gone.error) == (2, True)
 

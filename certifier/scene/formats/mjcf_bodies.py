@@ -51,7 +51,7 @@ def check_numbers(node: Node) -> None:
     if "range" in node.attributes:
         lower, upper = numbers(node, "range", (2,))
         if lower >= upper and node.attributes.get("limited") != "false":
-            refuse(node, f"the limits of a joint are {lower:g} and {upper:g}; the lower one must be less")
+            refuse(node, f"the limits of a joint are {lower:.9g} and {upper:.9g}; the lower one must be less")
 
 
 def check_joint(node: Node, attributes: dict[str, str], autolimits: bool) -> None:

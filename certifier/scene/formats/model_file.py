@@ -142,7 +142,7 @@ class ModelFile:
 
     def _check_order(self, element: Element, lower: float, upper: float) -> None:
         if lower > upper:
-            self.refuse(element, f"the limits of a joint are {lower:g} and {upper:g}; the lower one must not be greater")
+            self.refuse(element, f"the limits of a joint are {lower:.9g} and {upper:.9g}; the lower one must not be greater")
 
     def _numbers(self, element: Element, what: str, text: str, counts: tuple[int, ...]) -> list[float]:
         if (numbers := decimals(text, counts)) is None:

@@ -13,7 +13,7 @@ from certifier.conditions import Cone, Distance, Inside, Range
 from certifier.errors import SceneError
 from certifier.model import Scene
 from certifier.scene.conditions import condition, constrained, swept_in
-from certifier.scene.file import read_scene_file
+from certifier.scene.file import read_condition_file, read_scene_file
 from certifier.scene.load import load_scene
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
@@ -83,6 +83,18 @@ def test_all_kinds_are_read(tmp_path: Path) -> None:
         ("inside: {what: [cup/cup], half_spaces: []}", "scene_field", "inside.half_spaces", "list"),
         ("inside: {what: [cup/cup], half_spaces: [[1, 0, 0]]}", "scene_field", "inside.half_spaces[0]", "four"),
         ("inside: {what: [cup/cup], half_spaces: [[0, 0, 0, 1]]}", "scene_field", "inside.half_spaces[0]", "longer"),
+        (
+            "inside: {what: [cup/cup], half_spaces: [[0, 0, 1, 0], [0, 0, -1, -1]]}",
+            "scene_field",
+            "inside.half_spaces",
+            "no room",
+        ),
+        (
+            "inside: {what: [cup/cup], half_spaces: [[0, 0, 1, 0], [0, 0, -1, 0]]}",
+            "scene_field",
+            "inside.half_spaces",
+            "no room",
+        ),
         ("distance: {between: [cup/cup], metres: 0.1}", "scene_field", "distance.between", "two names"),
         ("distance: {between: [cup/cup, table/body]}", "scene_field", "distance.metres", "number"),
         ("distance: {between: [cup/cup, lab], metres: 0.1}", "unknown_name", "distance.between[1]", "lab"),
@@ -114,12 +126,40 @@ def test_a_condition_that_makes_no_sense_is_refused(tmp_path: Path, said: str, f
     assert (error.value.code, error.value.field) == ("condition", f"conditions[1].{field}")
 
 
+@pytest.mark.parametrize("name", ["a/b", "turning"])
+def test_a_condition_needs_a_name_of_its_own_kind(tmp_path: Path, name: str) -> None:
+    path = file(tmp_path, f"  - name: {name}\n    range: {{joints: {{arm/elbow_joint: 1}}, degrees: [0, 90]}}")
+    with pytest.raises(SceneError, match="without a slash") as error:
+        load_scene(path)
+    assert (error.value.code, error.value.field) == ("scene_field", "conditions[0].name")
+
+
+def test_a_file_of_conditions_has_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "low.yaml"
+    for text, field, words in (
+        ("conditions: []\npadding: 0.01", "low.yaml: padding", "known keys: conditions"),
+        ("padding: 0.01", "low.yaml: padding", "known keys: conditions"),
+        ("{}", "low.yaml: conditions", "is missing"),
+        ("", "low.yaml", "must be a mapping with the key conditions"),
+        ("5", "low.yaml", "must be a mapping with the key conditions"),
+        ("conditions: 5", "low.yaml: conditions", "must be a list of conditions"),
+    ):
+        path.write_text(text)
+        with pytest.raises(SceneError, match=words) as error:
+            read_condition_file(path)
+        assert (error.value.code, error.value.field) == ("scene_field", field)
+    endless = tmp_path / "endless.yaml"
+    endless.symlink_to("/dev/zero")
+    with pytest.raises(SceneError, match="too long"):
+        read_condition_file(endless)
+
+
 def test_a_scene_is_constrained_as_if_its_file_had_the_conditions(tmp_path: Path, scene: Scene) -> None:
     bare = load_scene(file(tmp_path, "  []"))
     entries = read_scene_file(EXAMPLES / "ur3e_cup/scene.yaml").conditions
     one = constrained(bare, entries[:1])
     assert constrained(one, entries[1:]).hash == constrained(bare, entries).hash == scene.hash
-    with pytest.raises(SceneError, match="two conditions have one name"):
+    with pytest.raises(SceneError, match="upright is the name of a condition that the scene has"):
         constrained(one, entries)
     assert constrained(scene, ()).hash == scene.hash
 
