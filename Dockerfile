@@ -21,9 +21,13 @@ FROM python:3.12.14-slim-bookworm@sha256:782412e85d0f0984994c290652577d4018aff08
 RUN apt-get update && apt-get install --yes --no-install-recommends libglib2.0-0 tini && rm -rf /var/lib/apt/lists/*
 RUN useradd --create-home --uid 10001 ciris
 COPY --from=build /venv /venv
-# All but /tmp may be read-only: compiled kernels are kept there.
-ENV PATH=/venv/bin:$PATH PYTHONUNBUFFERED=1 NUMBA_CACHE_DIR=/tmp/numba
+ENV PATH=/venv/bin:$PATH PYTHONUNBUFFERED=1 CIRIS_KERNELS=/venv/kernels
+# What jobs call is compiled here, for processors like this machine's. Workers compile it again on others.
+RUN NUMBA_CACHE_DIR=$CIRIS_KERNELS python -m jobs.kernels
+COPY --chmod=755 deploy/entry /usr/local/bin/ciris-entry
+# All but /tmp may be read-only.
+ENV NUMBA_CACHE_DIR=/tmp/numba
 USER ciris
 WORKDIR /home/ciris
-ENTRYPOINT ["tini", "--"]
+ENTRYPOINT ["tini", "--", "ciris-entry"]
 CMD ["python", "-m", "api"]

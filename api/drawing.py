@@ -26,8 +26,8 @@ from api.schemas.drawing import (
     SliceResponse,
 )
 from certifier.broken import trouble
-from certifier.conditioned import zone_reach
-from certifier.conditions import Cone, Inside, of_condition
+from certifier.conditioned import faces_of, zone_reach
+from certifier.conditions import Cone, InBall, Inside, of_condition
 from certifier.errors import RegionError
 from certifier.isolation.child import run_in_child
 from certifier.model import Array, Geometry, Polytope, Scene
@@ -73,7 +73,7 @@ def model(scene_id: str, scene: Scene) -> SceneModel:
         padding=scene.padding,
         geometries=[_drawn(geometry) for geometry in scene.geometries],
         pairs=[(index[pair.a], index[pair.b]) for pair in scene.pairs],
-        zones=[_zone(scene, condition) for condition in scene.conditions if isinstance(condition, Inside)],
+        zones=[_zone(scene, condition) for condition in scene.conditions if isinstance(condition, Inside | InBall)],
         cones=[_cone(condition) for condition in scene.conditions if isinstance(condition, Cone)],
     )
 
@@ -90,9 +90,9 @@ def _drawn(geometry: Geometry) -> DrawnGeometry:
     )
 
 
-def _zone(scene: Scene, condition: Inside) -> DrawnZone:
+def _zone(scene: Scene, condition: Inside | InBall) -> DrawnZone:
     sides, reach = np.concatenate([np.eye(3), -np.eye(3)]), zone_reach(scene, condition)
-    faces = np.concatenate([condition.faces, np.column_stack([sides, np.full(6, reach)])])
+    faces = np.concatenate([faces_of(condition), np.column_stack([sides, np.full(6, reach)])])
     vertices = np.zeros((0, 3))
     with suppress(RegionError):  # Nothing is in the zone, or it is flat.
         middle, _ = chebyshev_center(Polytope(faces[:, :3], faces[:, 3]))

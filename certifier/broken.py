@@ -9,7 +9,7 @@ import numpy as np
 from certifier.collisions.free import distance_at
 from certifier.collisions.seen import seen_of
 from certifier.conditioned import condition_of, distance_of
-from certifier.conditions import Condition, Cone, Distance, Inside, Range
+from certifier.conditions import MODEL, Condition, Cone, Distance, InBall, Inside, Range, SlideRange, of_condition
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Pair, Scene
 from certifier.motion.bodies import bodies_of
@@ -46,19 +46,35 @@ def _by(scene: Scene, pair: Pair, condition: Condition, q: Array) -> str:
             angle = math.acos(float(np.clip((ends[0] - ends[1]) @ condition.along, -1.0, 1.0)))
             return f"the angle is {math.degrees(angle):.4g} degrees, and {math.degrees(condition.angle):.9g} at most"
         case Range():
-            place = {joint.name: joint.index or 0 for joint in scene.moving}
-            total = sum(sign * q[place[name]] for name, sign in condition.joints)
+            total = _sum(scene, condition, q)
             middle, half = (condition.lower + condition.upper) / 2, (condition.upper - condition.lower) / 2
             beyond = abs(math.remainder(total - middle, 2 * math.pi)) - half
             return f"the sum of the angles is {math.degrees(beyond):.4g} degrees beyond its range"
-        case Inside():
-            geometry = scene.geometry(pair.a if pair.a in condition.geometries else pair.b)
-            faces = np.array(condition.faces)
+        case SlideRange():
+            total = _sum(scene, condition, q)
+            beyond = max(condition.lower - total, total - condition.upper)
+            return f"the sum of the positions is {1000 * beyond:.4g} mm beyond its range"
+        case Inside() | InBall():
+            face = f"{MODEL}/{condition.name}/face"
+            geometry = scene.geometry(pair.b if pair.a.startswith(face) else pair.a)
             points = kinematics.points(condition.of, geometry.body, geometry.vertices, s)[0]
-            beyond = float((points @ faces[:, :3].T - faces[:, 3]).max()) + geometry.radius
-            return f"{geometry.name} reaches {1000 * beyond:.4g} mm beyond the zone"
+            if isinstance(condition, InBall):
+                beyond = float(np.linalg.norm(points - condition.center, axis=1).max()) - condition.radius + geometry.radius
+            else:
+                faces = np.array(condition.faces)
+                beyond = float((points @ faces[:, :3].T - faces[:, 3]).max()) + geometry.radius
+            what = f"a point of {geometry.body}" if of_condition(geometry.name) else geometry.name
+            if beyond <= 0:
+                return f"{what} is {-1000 * beyond:.4g} mm from the surface of the ball, which is too near to prove it"
+            return f"{what} reaches {1000 * beyond:.4g} mm beyond the zone"
         case Distance():
             return f"{pair.a} and {pair.b} are {_apart(scene, pair, q):.4g} m apart, and {condition.metres:.9g} at least"
+
+
+def _sum(scene: Scene, condition: Range | SlideRange, q: Array) -> float:
+    """Returns the sum of the joints of a range at q, (n,), in radians or metres."""
+    place = {joint.name: joint.index or 0 for joint in scene.moving}
+    return sum(sign * float(q[place[name]]) for name, sign in condition.joints)
 
 
 def _apart(scene: Scene, pair: Pair, q: Array) -> float:

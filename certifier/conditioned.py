@@ -2,7 +2,8 @@
 
 A cone is about directions. The joints that turn the body are copied without their offsets, each moving with the one that it copies. A ball
 at the end of the direction has to stay out of the box of all directions that are too far away. A range of angles is a cone of a chain
-that turns in a plane. Outside of each face of a zone there is a box as large as the geometries reach. A distance is padding.
+that turns in a plane, and a range of slides is a zone on a line. Outside of each face of a zone there is a box as large as the geometries
+reach. A ball is a zone with many faces inside of it. A distance is padding.
 
 All numbers are rounded to the safe side by ROOM: two geometries are apart only if the condition holds.
 """
@@ -12,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 
@@ -23,8 +24,10 @@ from certifier.conditions import (
     Condition,
     Cone,
     Distance,
+    InBall,
     Inside,
     Range,
+    SlideRange,
     condition_named,
     is_condition_name,
     of_condition,
@@ -38,6 +41,8 @@ ROOM = 1e-9
 """A face is moved by this to the safe side, in metres, and in cosines of angles; the face of a zone by this part of what the geometries
 reach, where that is more than a metre. It is far above what doubles round, and above what statements round in their numbers.
 """
+POINT = 1e-7
+"""A point that has to stay somewhere is a ball of this radius, in metres."""
 BALL = 0.01
 """Radius of the ball at the end of a direction, which is 1 long."""
 LONG = 2.0
@@ -54,6 +59,9 @@ MOST_TURNS = 10
 """The lower angle of a range is at most this many turns, so that ROOM is far above what doubles round in it."""
 UNIT = 1e-12
 """The length of a direction differs from 1 by less than this."""
+Face = tuple[float, float, float, float]
+ALONG = 0.65
+"""A face begins at the first axis along which its normal has less than this: at least one has less than 0.58, and rounding is far away."""
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 
 
@@ -96,7 +104,7 @@ def _check_size(conditions: Sequence[Condition]) -> None:
     Raises:
         SceneError: ``condition``.
     """
-    pairs = sum(len(one.geometries) * len(one.faces) for one in conditions if isinstance(one, Inside))
+    pairs = sum((len(one.geometries) + len(one.points)) * len(faces_of(one)) for one in conditions if isinstance(one, Inside | InBall))
     for number, most, what, hint in (
         (len(conditions), MOST_CONDITIONS, "conditions", "leave some out"),
         (pairs, MOST_IN_ZONES, "pairs of a geometry and a face of a zone", "name fewer geometries, or give zones fewer faces"),
@@ -125,29 +133,41 @@ def _check(scene: Scene, condition: Condition) -> None:
             _check_vectors(condition, condition.axis, condition.along)
             if not LEAST_ANGLE <= condition.angle <= math.pi - LEAST_ANGLE:
                 raise _wrong(condition, "its angle has to be between 0.1 and 179.9 degrees")
-        case Inside():
-            _check_bodies(scene, condition, condition.of)
-            if not condition.geometries or not all(map(scene.has_geometry, condition.geometries)):
-                raise _wrong(condition, "it has to name geometries of the scene")
+        case Inside() | InBall():
+            _check_bodies(scene, condition, condition.of, *(body for body, _ in condition.points))
+            if not condition.geometries + condition.points or not all(map(scene.has_geometry, condition.geometries)):
+                raise _wrong(condition, "it has to name geometries of the scene, or points of bodies")
             if any(scene.geometry(name).shape.get("kind") == "half_space" for name in condition.geometries):
                 raise _wrong(condition, "a half-space has no end, so it is in no zone")
-            if not condition.faces or len(condition.faces) > MOST_FACES:
+            if isinstance(condition, InBall):
+                if not 0 < condition.radius <= MAGNITUDE:
+                    raise _wrong(condition, "its radius has to be positive")
+            elif not condition.faces or len(condition.faces) > MOST_FACES:
                 raise _wrong(condition, f"its zone needs 1 to {MOST_FACES} faces")
-            _check_vectors(condition, *(face[:3] for face in condition.faces))
+            else:
+                _check_vectors(condition, *(face[:3] for face in condition.faces))
         case Distance():
             if not (is_name(condition.a) and is_name(condition.b)):
                 raise _wrong(condition, "it has to name two bodies or geometries")
             if not 0 < condition.metres <= MAGNITUDE:
                 raise _wrong(condition, "its distance has to be positive")
+        case SlideRange():
+            _check_joints(scene, condition, JointKind.PRISMATIC, "slide")
+            if not condition.lower < condition.upper:
+                raise _wrong(condition, "its lower number has to be less than its upper one")
         case Range():
-            names, known = [joint for joint, _ in condition.joints], {j.name for j in scene.moving if j.kind is JointKind.REVOLUTE}
-            if not names or len(set(names)) < len(names) or not {*names} <= known:
-                raise _wrong(condition, "it has to name joints that turn and have positions of their own, each once")
+            _check_joints(scene, condition, JointKind.REVOLUTE, "turn")
             apart = condition.upper - condition.lower
             if not 2 * LEAST_ANGLE <= apart <= 2 * (math.pi - LEAST_ANGLE):
                 raise _wrong(condition, "its angles have to be 0.2 to 359.8 degrees apart")
             if not abs(condition.lower) <= 2 * math.pi * MOST_TURNS:
                 raise _wrong(condition, f"its lower angle has to be within {360 * MOST_TURNS} degrees of 0")
+
+
+def _check_joints(scene: Scene, condition: Range | SlideRange, kind: JointKind, move: str) -> None:
+    names, known = [joint for joint, _ in condition.joints], {joint.name for joint in scene.moving if joint.kind is kind}
+    if not names or len(set(names)) < len(names) or not {*names} <= known:
+        raise _wrong(condition, f"it has to name joints that {move} and have positions of their own, each once")
 
 
 def _check_bodies(scene: Scene, condition: Condition, *bodies: str) -> None:
@@ -205,12 +225,6 @@ def distance_of(scene: Scene, pair: Pair) -> Distance | None:
     return max(kept, key=lambda one: one.metres, default=None)
 
 
-def called(scene: Scene, pair: Pair) -> str:
-    """Returns what messages call a pair: its geometries, or the condition that it proves."""
-    condition = condition_of(scene, pair)
-    return f"{pair.a} and {pair.b}" if condition is None else f"the condition '{condition.name}'"
-
-
 @dataclass
 class _Parts:
     """Gathers what stands for the conditions of a scene.
@@ -234,12 +248,14 @@ class _Parts:
         match condition:
             case Cone():
                 self._cone(condition, self._turning(condition.body), condition.axis, self._turning(condition.of), condition.along)
-            case Inside():
+            case Inside() | InBall():
                 self._inside(condition)
             case Distance():
                 self._distance(condition)
             case Range():
                 self._range(condition)
+            case SlideRange():
+                self._slides(condition)
 
     def _cone(self, condition: Cone | Range, body: str, axis: Sequence[float], of: str, along: Sequence[float]) -> None:
         angle = condition.angle if isinstance(condition, Cone) else (condition.upper - condition.lower) / 2
@@ -265,26 +281,49 @@ class _Parts:
             self._copies[body] = copy
         return self._copies[body]
 
-    def _range(self, condition: Range) -> None:
+    def _sum(self, condition: Range | SlideRange, axis: Array) -> str:
+        """Returns the last of bodies that copies of the joints move one after the other about an axis, or along it."""
         moving = {joint.name: joint for joint in self.scene.moving}
         parent = WORLD
         for i, (name, sign) in enumerate(condition.joints):
             leader, child = moving[name], f"{MODEL}/{condition.name}/turn{i}"
-            axis = np.array([0.0, 0.0, float(sign)])
-            turn = replace(leader, name=child, parent=parent, child=child, axis=axis, X_PF=np.eye(4), X_BM=np.eye(4), follows=True)
-            self.above[child] = turn
+            copied = replace(
+                leader, name=child, parent=parent, child=child, axis=float(sign) * axis, X_PF=np.eye(4), X_BM=np.eye(4), follows=True
+            )
+            self.above[child] = copied
             parent = child
+        return parent
+
+    def _slides(self, condition: SlideRange) -> None:
+        point = Geometry(
+            f"{MODEL}/{condition.name}/point",
+            self._sum(condition, np.array([1.0, 0.0, 0.0])),
+            np.zeros((1, 3)),
+            POINT,
+            {"kind": "condition"},
+        )
+        faces = ((1.0, 0.0, 0.0, condition.upper), (-1.0, 0.0, 0.0, -condition.lower))
+        self.geometries.append(point)
+        self._zone(condition, WORLD, faces, [point], _reach(self.above, point, WORLD))
+
+    def _range(self, condition: Range) -> None:
+        parent = self._sum(condition, np.array([0.0, 0.0, 1.0]))
         middle = (condition.lower + condition.upper) / 2
         self._cone(condition, parent, (1.0, 0.0, 0.0), WORLD, (math.cos(middle), math.sin(middle), 0.0))
 
-    def _inside(self, condition: Inside) -> None:
-        scene, frame = self.scene, f"{MODEL}/{condition.name}/zone"
-        self.above[frame] = Joint(frame, JointKind.WELD, condition.of, frame, np.zeros(3), np.eye(4), np.eye(4))
-        geometries = [scene.geometry(name) for name in condition.geometries]
+    def _inside(self, condition: Inside | InBall) -> None:
+        scene, points = self.scene, _points(condition)
+        self.geometries += points
+        geometries = [*(scene.geometry(name) for name in condition.geometries), *points]
         for geometry in geometries:
             _check_way(condition, scene.joint_above, geometry.body, condition.of, f"{geometry.name} does not move against {condition.of}")
-        reach = zone_reach(scene, condition)
-        for i, (*normal, offset) in enumerate(condition.faces):
+        self._zone(condition, condition.of, faces_of(condition), geometries, zone_reach(scene, condition))
+
+    def _zone(self, condition: Condition, of: str, faces: Iterable[Face], geometries: Sequence[Geometry], reach: float) -> None:
+        """Adds what geometries have to stay out of, so that they are within faces in the frame of a body."""
+        frame = f"{MODEL}/{condition.name}/zone"
+        self.above[frame] = Joint(frame, JointKind.WELD, of, frame, np.zeros(3), np.eye(4), np.eye(4))
+        for i, (*normal, offset) in enumerate(faces):
             if offset >= reach:
                 continue  # No geometry reaches this face.
             name = f"{MODEL}/{condition.name}/face{i}"
@@ -321,7 +360,8 @@ def _between(sides: tuple[set[str], set[str]], pair: Pair) -> bool:
 def _slab(normal: Array, begin: float, depth: float, lateral: float) -> Array:
     """Returns the corners, (8, 3), of the box from ``begin`` along a direction on, as deep as ``depth``, and ``lateral`` to all sides."""
     normal = _unit(normal)
-    across = np.linalg.svd(normal[None])[2][1:]
+    first = _unit(np.cross(normal, np.eye(3)[np.argmax(np.abs(normal) < ALONG)]))
+    across = first, np.cross(normal, first)
     x, y, z = CORNERS.T
     return np.outer(begin + depth * x, normal) + lateral * (np.outer(y, across[0]) + np.outer(z, across[1]))
 
@@ -377,15 +417,45 @@ def _check_way(condition: Condition, above: Mapping[str, Joint], body: str, of: 
         raise _wrong(condition, f"joints that move together are between {body} and {of}")
 
 
-def zone_reach(scene: Scene, condition: Inside) -> float:
+def _points(condition: Inside | InBall) -> list[Geometry]:
+    """Returns what stands for the points of a condition."""
+    names = (f"{MODEL}/{condition.name}/point{i}" for i in range(len(condition.points)))
+    return [
+        Geometry(name, body, np.array([point]), POINT, {"kind": "condition"})
+        for name, (body, point) in zip(names, condition.points, strict=True)
+    ]
+
+
+def faces_of(condition: Inside | InBall) -> tuple[Face, ...]:
+    """Returns the faces of a zone, as :class:`certifier.conditions.Inside` has them; those of a polytope in the ball for a ball."""
+    if isinstance(condition, Inside):
+        return condition.faces
+    offsets = AROUND @ condition.center + COVERED * condition.radius
+    return tuple((x, y, z, d) for (x, y, z), d in zip(AROUND.tolist(), offsets.tolist(), strict=True))
+
+
+def _around() -> Array:
+    """Returns 92 directions, (92, 3): the corners of an icosahedron, and the points that cut its triangles into nine each."""
+    golden = (1 + math.sqrt(5)) / 2
+    corners = np.array([np.roll([0.0, a, b * golden], k) for k in range(3) for a in (1, -1) for b in (1, -1)])
+    found = [*corners]
+    for i, j in combinations(range(12), 2):
+        if corners[i] @ corners[j] > 0:  # an edge
+            found += [(2 * corners[i] + corners[j]) / 3, (corners[i] + 2 * corners[j]) / 3]
+            found += [(corners[i] + corners[j] + corners[k]) / 3 for k in range(j + 1, 12) if min(corners[[i, j]] @ corners[k]) > 0]
+    return np.array([_unit(one) for one in found])
+
+
+def zone_reach(scene: Scene, condition: Inside | InBall) -> float:
     """Returns a distance in metres from the origin of a zone's body that no point of its geometries exceeds."""
-    return max(_reach(scene, scene.geometry(name), condition.of) for name in condition.geometries)
+    geometries = [*(scene.geometry(name) for name in condition.geometries), *_points(condition)]
+    return max(_reach(scene.joint_above, geometry, condition.of) for geometry in geometries)
 
 
-def _reach(scene: Scene, geometry: Geometry, of: str) -> float:
+def _reach(above: Mapping[str, Joint], geometry: Geometry, of: str) -> float:
     """Returns a distance in metres from a body's origin that no point of a geometry exceeds, as certifier.scene.tree.Tree.reach."""
     total = float(np.linalg.norm(geometry.vertices, axis=1).max()) + geometry.radius
-    for joint in _path(scene.joint_above, geometry.body, of):
+    for joint in _path(above, geometry.body, of):
         slide = max(abs(joint.lower or 0.0), abs(joint.upper or 0.0)) * joint.speed
         total += float(np.linalg.norm(joint.X_PF[:3, 3])) + slide + float(np.linalg.norm(joint.X_BM[:3, 3]))
     return total * (1 + ROOM) + ROOM
@@ -398,3 +468,9 @@ def _wrong(condition: Condition, problem: str) -> SceneError:
         field=f"conditions.{condition.name}",
         hint="docs/conditions.md says what conditions need",
     )
+
+
+AROUND, COVERED = _around(), 0.9716
+"""Directions of the faces of a polytope in a ball. Each direction has one of them so near that the cosine of the angle between the two is
+above COVERED. So what is within COVERED of the radius along all of them is in the ball.
+"""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -45,6 +45,17 @@ def condition_named(*names: str) -> str | None:
     return next((name.split("/")[1] for name in names if of_condition(name)), None)
 
 
+def called(a: str, b: str) -> str:
+    """Returns what messages call a pair: its two geometries, or the condition that it proves."""
+    condition = condition_named(a, b)
+    return f"{a} and {b}" if condition is None else f"the condition '{condition}'"
+
+
+def fails(a: str, b: str, how: str = "touch") -> str:
+    """Returns in words that two geometries touch, or do whatever ``how`` says, or that the condition that they prove is not kept."""
+    return f"{called(a, b)} {how if condition_named(a, b) is None else 'is not kept'}"
+
+
 @dataclass(frozen=True)
 class Cone:
     """A direction of a body stays within an angle of a direction of another body, or of the world.
@@ -69,30 +80,63 @@ class Cone:
 
 
 @dataclass(frozen=True)
-class Inside:
-    """Geometries stay in a convex zone. The padding of the scene does not count for it.
+class Staying:
+    """What stays in a zone. The padding of the scene does not count for it.
 
     Attributes:
         geometries: their names.
         of: the body in whose frame the zone is, or the world.
-        faces: the zone has x . (a, b, c) <= d for each (a, b, c, d), in metres; (a, b, c) is a unit vector, as far as doubles go.
+        points: bodies, and a point of each in its frame, in metres.
     """
 
     name: str
     geometries: tuple[str, ...]
     of: str
+    points: tuple[tuple[str, Vector], ...] = field(default=(), kw_only=True)
+
+    @property
+    def stay(self) -> str:
+        """Returns who stays, in words."""
+        named = [*map(repr, self.geometries), *(f"the point {_shown(point)} m of '{body}'" for body, point in self.points)]
+        return f"{', '.join(named)} {'stays' if len(named) == 1 else 'stay'}"
+
+
+@dataclass(frozen=True)
+class Inside(Staying):
+    """Geometries and points stay in a convex zone.
+
+    Attributes:
+        faces: the zone has x . (a, b, c) <= d for each (a, b, c, d), in metres; (a, b, c) is a unit vector, as far as doubles go.
+    """
+
     faces: tuple[tuple[float, float, float, float], ...]
     kind: ClassVar = "inside"
 
     def __str__(self) -> str:
-        names, stay = ", ".join(repr(name) for name in self.geometries), "stays" if len(self.geometries) == 1 else "stay"
         if tuple(normal for *normal, _ in self.faces) == _OF_A_BOX:
             offsets = [d for *_, d in self.faces]
             lower, upper = (", ".join(side) for side in ([_down(-d) for d in offsets[3:]], [_up(d) for d in offsets[:3]]))
             box = f"in the box from ({lower}) to ({upper}) m"
-            return f"{names} {stay} {box}, in the frame of '{self.of}'"
+            return f"{self.stay} {box}, in the frame of '{self.of}'"
         faces = ", ".join(f"{_shown(normal)} . x <= {_up(d)} m" for *normal, d in self.faces)
-        return f"{names} {stay} where {faces}, in the frame of '{self.of}'"
+        return f"{self.stay} where {faces}, in the frame of '{self.of}'"
+
+
+@dataclass(frozen=True)
+class InBall(Staying):
+    """Geometries and points stay in a ball.
+
+    Attributes:
+        center: metres, in the frame of ``of``.
+        radius: metres.
+    """
+
+    center: Vector
+    radius: float
+    kind: ClassVar = "ball"
+
+    def __str__(self) -> str:
+        return f"{self.stay} in the ball of {_up(self.radius)} m about {_shown(self.center)}, in the frame of '{self.of}'"
 
 
 @dataclass(frozen=True)
@@ -125,12 +169,34 @@ class Range:
     kind: ClassVar = "range"
 
     def __str__(self) -> str:
-        total = " ".join(f"{'+' if sign > 0 else '-'} '{joint}'" for joint, sign in self.joints).removeprefix("+ ")
         lower, upper = _down(math.degrees(self.lower)), _up(math.degrees(self.upper))
-        return f"{total} stays from {lower} to {upper} degrees, but for whole turns"
+        return f"{_sum(self.joints)} stays from {lower} to {upper} degrees, but for whole turns"
 
 
-Condition = Cone | Inside | Distance | Range
+@dataclass(frozen=True)
+class SlideRange:
+    """The sum of the positions of joints that slide, each with its sign, stays between two numbers.
+
+    Attributes:
+        joints: the joints, and 1 or -1 for each.
+        lower, upper: metres.
+    """
+
+    name: str
+    joints: tuple[tuple[str, int], ...]
+    lower: float
+    upper: float
+    kind: ClassVar = "slides"
+
+    def __str__(self) -> str:
+        return f"{_sum(self.joints)} stays from {_down(self.lower)} to {_up(self.upper)} m"
+
+
+def _sum(joints: Iterable[tuple[str, int]]) -> str:
+    return " ".join(f"{'+' if sign > 0 else '-'} '{joint}'" for joint, sign in joints).removeprefix("+ ")
+
+
+Condition = Cone | Inside | InBall | Distance | Range | SlideRange
 _READ: dict[str, tuple[tuple[str, ...], Callable[[dict[str, Node]], Condition]]] = {
     Cone.kind: (
         ("name", "body", "axis", "of", "along", "angle"),
@@ -138,7 +204,11 @@ _READ: dict[str, tuple[tuple[str, ...], Callable[[dict[str, Node]], Condition]]]
     ),
     Inside.kind: (
         ("name", "geometries", "of", "faces"),
-        lambda f: Inside(_text(f, "name"), tuple(one.text() for one in f["geometries"].items()), _text(f, "of"), _faces(f["faces"])),
+        lambda f: Inside(_text(f, "name"), _names(f), _text(f, "of"), _faces(f["faces"]), points=_points(f)),
+    ),
+    InBall.kind: (
+        ("name", "geometries", "of", "center", "radius"),
+        lambda f: InBall(_text(f, "name"), _names(f), _text(f, "of"), _vector(f["center"]), _number(f["radius"]), points=_points(f)),
     ),
     Distance.kind: (
         ("name", "a", "b", "metres"),
@@ -148,12 +218,17 @@ _READ: dict[str, tuple[tuple[str, ...], Callable[[dict[str, Node]], Condition]]]
         ("name", "joints", "lower", "upper"),
         lambda f: Range(_text(f, "name"), _signed(f["joints"]), _number(f["lower"]), _number(f["upper"])),
     ),
+    SlideRange.kind: (
+        ("name", "joints", "lower", "upper"),
+        lambda f: SlideRange(_text(f, "name"), _signed(f["joints"]), _number(f["lower"]), _number(f["upper"])),
+    ),
 }
 
 
 def to_document(condition: Condition) -> dict[str, Any]:
-    """Returns a condition as JSON-able data."""
-    return {"kind": condition.kind, **{name: _plain(value) for name, value in asdict(condition).items()}}
+    """Returns a condition as JSON-able data. Points are there if there are some: scenes had conditions before they had points."""
+    given = {name: _plain(value) for name, value in asdict(condition).items() if name != "points" or value}
+    return {"kind": condition.kind, **given}
 
 
 def from_document(node: Node) -> Condition:
@@ -166,7 +241,7 @@ def from_document(node: Node) -> Condition:
     if not isinstance(kind, str) or kind not in _READ:
         node.refuse(f"a condition, whose kind is one of {', '.join(_READ)}")
     fields, read = _READ[kind]
-    return read(node.fields("kind", *fields))
+    return read(node.fields("kind", *fields, optional=("points",) if "geometries" in fields else ()))
 
 
 def _plain(value: Any) -> Any:
@@ -204,6 +279,15 @@ def _number(node: Node) -> float:
 def _vector(node: Node) -> Vector:
     x, y, z = node.array(3).tolist()
     return x, y, z
+
+
+def _names(fields: dict[str, Node]) -> tuple[str, ...]:
+    return tuple(one.text() for one in fields["geometries"].items())
+
+
+def _points(fields: dict[str, Node]) -> tuple[tuple[str, Vector], ...]:
+    pairs = [one.two() for one in fields["points"].items()] if "points" in fields else []
+    return tuple((body.text(), _vector(point)) for body, point in pairs)
 
 
 def _faces(node: Node) -> tuple[tuple[float, float, float, float], ...]:

@@ -8,6 +8,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
+from certifier.conditions import called, fails
 from certifier.errors import CirisError
 from certifier.outcome import Outcome
 from certifier.verify.decimals import at_most_mm, exactly
@@ -215,7 +216,7 @@ def certify(args: Namespace) -> int:
             if pair["witness_q"] is not None:
                 where = ", ".join(f"{value:.6g}" for value in pair["witness_q"])
                 collides = pair["outcome"] == Outcome.REFUTED
-                how = f"collision of {pair['a']} and {pair['b']}" if collides else f"{pair['a']} and {pair['b']}: {pair['detail']},"
+                how = fails(pair["a"], pair["b"]) if collides else f"{called(pair['a'], pair['b'])}: {pair['detail']},"
                 print(f"{how} at q = {where}")
         scene = document["scene"]["name"]
         print(f"{scene}: {output.plain(document['outcome'])}, guarantee {document['guarantee']}, {output.seconds(document['seconds'])}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from certifier.conditions import called
 from certifier.outcome import Outcome, Stage
 from ciris.documents import Document
 from ciris.synchronous.client import Client
@@ -99,7 +100,7 @@ class Teller:
 
 def follow(client: Client, job_id: str, screen: Screen, watch: bool) -> Document:
     """Tells the job's events until the job has ended, and returns the ended job."""
-    pairs = [f"{pair['a']} - {pair['b']}" for pair in client.job_pairs(job_id, iteration=0)["pairs"]]
+    pairs = [called(pair["a"], pair["b"]) for pair in client.job_pairs(job_id, iteration=0)["pairs"]]
     teller = Teller(screen, pairs, watch)
     for event in client.events(job_id):
         teller.tell(event)

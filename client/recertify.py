@@ -6,6 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
+from certifier.conditions import called
 from certifier.errors import CirisError, unreadable
 from ciris.documents import Document
 from ciris.synchronous.client import Client
@@ -98,7 +99,7 @@ def _proof(path: Path) -> bytes:
 
 def _facts(said: dict[str, Any]) -> list[tuple[str, str]]:
     """Returns what people hear of the region before and of its proofs."""
-    cut = [f"{pair['a']} - {pair['b']}" for pair in said["cut"]]
+    cut = [called(pair["a"], pair["b"]) for pair in said["cut"]]
     return [
         ("kept", f"{output.share(said['kept'])} of the region before"),
         ("proofs", f"{len(said['carried'])} pairs carried over, {len(said['proved'])} proved again"),

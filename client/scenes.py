@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import sys
 from argparse import Namespace
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
 import numpy as np
 
 from certifier.conditioned import condition_of
-from certifier.conditions import of_condition
+from certifier.conditions import called, condition_named, of_condition
 from certifier.configurations import is_number
 from certifier.errors import CirisError
 from certifier.kinematics import Kinematics
@@ -129,9 +130,10 @@ def scene_check(args: Namespace) -> int:
     (touches,) = touching(scene, [scene.in_windows(q)])
     broken = sorted((pair for pair in touches if pair in set(scene.pairs)), key=lambda p: (p.a, p.b))
     bad = [pair for pair in broken if condition_of(scene, pair) is None]
+    unkept = dict.fromkeys(one.name for pair in broken if (one := condition_of(scene, pair)))
     costs = sorted(forecast(scene), key=lambda cost: -cost.seconds)
     if args.json:
-        output.print_json(_document(scene, q, [[p.a, p.b] for p in broken], costs))
+        output.print_json(_document(scene, q, bad, unkept, costs))
         return 1 if broken else 0
     geometries = sum(not of_condition(geometry.name) for geometry in scene.geometries)
     print(f"{scene.name}: {scene.n} joints, {geometries} geometries, {len(scene.body_pairs)} pairs, {len(scene.ignored)} ignored")
@@ -155,7 +157,7 @@ def scene_check(args: Namespace) -> int:
     for pair in bad:
         padded = f", with a padding of {scene.padding_of(pair):g} m on each" if scene.padding_of(pair) else ""
         print(f"touching at {whence}: {pair.a} and {pair.b}{padded}")
-    for name in dict.fromkeys(one.name for pair in broken if (one := condition_of(scene, pair))):
+    for name in unkept:
         print(f"not kept at {whence}: the condition {name}")
     if not broken:
         print(f"nothing touches at {whence}")
@@ -163,7 +165,7 @@ def scene_check(args: Namespace) -> int:
     kinematics = Kinematics.of(scene)
     for cost in costs[:COSTLIEST]:
         joints = len(kinematics.chain(*(scene.geometry(name).body for name in (cost.a, cost.b))))
-        print(f"  {cost.a} and {cost.b}: {joints} joints between them, {output.seconds(cost.seconds)}")
+        print(f"  {called(cost.a, cost.b)}: {joints} joints between them, {output.seconds(cost.seconds)}")
     return 1 if broken else 0
 
 
@@ -203,7 +205,7 @@ def _replaced(scene: Scene) -> list[tuple[str, ...]]:
     ]
 
 
-def _document(scene: Scene, q: np.ndarray, bad: list[list[str]], costs: list[PairCost]) -> dict[str, object]:
+def _document(scene: Scene, q: np.ndarray, bad: Iterable[Pair], unkept: Collection[str], costs: list[PairCost]) -> dict[str, object]:
     return {
         "name": scene.name,
         "hash": scene.hash,
@@ -213,11 +215,18 @@ def _document(scene: Scene, q: np.ndarray, bad: list[list[str]], costs: list[Pai
         ],
         "q": q.tolist(),
         "configurations": {name: dict(positions) for name, positions in scene.configurations.items()},
-        "touching": bad,
+        "touching": [[pair.a, pair.b] for pair in bad],
+        "conditions": [
+            {"name": one.name, "kind": one.kind, "statement": str(one), "kept": one.name not in unkept} for one in scene.conditions
+        ],
         "warnings": list(scene.warnings),
         "substitutions": [
             {"geometry": g.name, "what": g.substitution, "inflation": g.inflation} for g in scene.geometries if g.substitution
         ],
         "ignored": [{"a": i.a, "b": i.b, "reason": i.reason} for i in scene.ignored],
-        "pairs": [{"a": cost.a, "b": cost.b, "padding": scene.padding_of(Pair(cost.a, cost.b)), "seconds": cost.seconds} for cost in costs],
+        "pairs": [
+            {"a": cost.a, "b": cost.b, "padding": scene.padding_of(Pair(cost.a, cost.b)), "seconds": cost.seconds}
+            for cost in costs
+            if condition_named(cost.a, cost.b) is None
+        ],
     }

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import ConfigDict, Field, model_validator
 from sqlalchemy.orm import Session
 
+from certifier.conditions import fails
 from certifier.errors import CirisError
 from certifier.growth.actions import Finish
 from certifier.model import Scene
@@ -97,7 +98,7 @@ class Verdict:
             return cls(outcome, "every pair is certified all along the motion")
         touch = "come nearer than the padding of the request allows" if found.get("padding") else "touch"
         how = {Outcome.REFUTED: touch, Outcome.TOO_CLOSE: "are too close to tell"}.get(outcome, "are where the search ended")
-        return cls(outcome, f"{stop['a']} and {stop['b']} {how}, on piece {stop['piece']}; pieces count from 0")
+        return cls(outcome, f"{fails(stop['a'], stop['b'], how)}, on piece {stop['piece']}; pieces count from 0")
 
 
 class CertifyPath(Kind):

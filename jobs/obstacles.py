@@ -11,6 +11,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from certifier import stored
+from certifier.conditions import called, fails
 from certifier.growth import obstacles as growth
 from certifier.model import Pair, Scene
 from certifier.outcome import Outcome
@@ -43,7 +44,7 @@ def of_motion(scene: Scene, stop: dict[str, Any]) -> Held:
     """Returns the first place on a motion that could not be certified."""
     pair = Pair(stop["a"], stop["b"])
     how = "touch" if stop["distance"] <= 0 else f"are only {stop['distance']:.3g} m apart"
-    text = f"{pair.a} and {pair.b} {how} at the configuration named, the first on the motion that could not be certified."
+    text = f"{fails(pair.a, pair.b, how)} at the configuration named, the first on the motion that could not be certified."
     index = scene.pairs.index(pair) if pair in scene.pairs else None
     return Held(text, stop["q"], index, pair.a, pair.b)
 
@@ -89,15 +90,15 @@ def _of_pair(scene: Scene, index: int, cut: growth.Obstacle | None, failed: Sequ
 
 
 def _how_it_failed(pair: Pair, state: PairState, row: PairRow, failed: Sequence[PairRow]) -> str:
-    names = f"{pair.a} and {pair.b}"
+    names = called(pair.a, pair.b)
     detail = f": {row.detail}" if row.detail else ""
     match state:
         case PairState.REFUTED:
-            return f"{names} touch at the configuration named, which is proved."
+            return f"{fails(pair.a, pair.b)} at the configuration named, which is proved."
         case PairState.NOT_CERTIFIABLE:
             return f"It is proved that no certificate of the form of the program (11) exists for {names}; cells may certify them."
         case PairState.TOO_CLOSE:
-            return f"{names} come too close{detail}, as floating point says."
+            return f"{fails(pair.a, pair.b, 'come too close')}{detail}, as floating point says."
         case PairState.ERROR:
             return f"{names} could not be certified{detail}."
         case _:
@@ -110,11 +111,11 @@ def _what_was_cut(pair: Pair, cut: growth.Obstacle, *, where: bool) -> list[str]
     """Says what was cut off for a pair, and, if ``where``, how the pair failed at the configuration named."""
     sentences = []
     if where and cut.contact:
-        sentences.append(f"{pair.a} and {pair.b} touch at the configuration named, as floating point says.")
+        sentences.append(f"{fails(pair.a, pair.b)} at the configuration named, as floating point says.")
     elif where:
-        sentences.append(f"{pair.a} and {pair.b} could not be proved apart near the configuration named.")
+        sentences.append(f"{called(pair.a, pair.b)} could not be proved near the configuration named.")
     if cut.faces is None or cut.lost is None:
-        return [*sentences, f"Something was cut off for {pair.a} and {pair.b} {_times(cut.times)}."]
+        return [*sentences, f"Something was cut off for {called(pair.a, pair.b)} {_times(cut.times)}."]
     faces = "1 face was" if cut.faces == 1 else f"{cut.faces} faces were"
     return [*sentences, f"{faces} added or moved in for this pair, and cut off {100 * cut.lost:.2g} % of the polytope, as samples say."]
 

@@ -98,7 +98,7 @@ class ConditionInfo(BaseModel):
     model_config = ConfigDict(json_schema_extra={"examples": [{"name": "upright", "kind": "cone", "statement": _STATEMENT}]})
 
     name: str = Field(description="Its name.", examples=["upright"])
-    kind: str = Field(description="`cone`, `inside`, `distance` or `range`.", examples=["cone"])
+    kind: str = Field(description="`cone`, `inside`, `ball`, `distance`, `range` or `slides`.", examples=["cone"])
     statement: str = Field(
         description="What holds, in words.",
         examples=[_STATEMENT],

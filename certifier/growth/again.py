@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from certifier.conditions import fails
 from certifier.errors import ProofError, RegionError
 from certifier.growth.actions import Finish, Transition
 from certifier.growth.state import GrowthState, Start
@@ -63,7 +64,7 @@ def _contact(scene: Scene, polytope: Polytope, keep: Array) -> Finish | None:
         for s in keep[touching(kinematics, volumes, keep)]:
             outcome = Outcome.REFUTED if _is_witness(scene, pair, polytope, s) else Outcome.TOO_CLOSE
             how = "touch" if outcome is Outcome.REFUTED else "come too close"
-            return Finish(outcome, f"{REVOKED}{pair.a} and {pair.b} {how} at {in_words(scene, s)}, which has to stay inside")
+            return Finish(outcome, f"{REVOKED}{fails(pair.a, pair.b, how)} at {in_words(scene, s)}, which has to stay inside")
     return None
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from certifier.conditioned import called, condition_of
+from certifier.conditioned import condition_of
+from certifier.conditions import called
 from certifier.errors import CirisError, RegionError
 from certifier.growth.state import GrowthState
 from certifier.growth.whole import REVOKED
@@ -36,7 +37,7 @@ def at_deadline(scene: Scene, state: GrowthState | None, told: str) -> str:
     index, worst = max(state.obstacles.items(), key=lambda item: item[1].times)
     pair, rounds = scene.pairs[index], "1 round" if worst.times == 1 else f"{worst.times} rounds"
     stands = "was" if condition_of(scene, pair) else "were"
-    return f"{DEADLINE}; {called(scene, pair)} {stands} in the way of a region in {rounds}"
+    return f"{DEADLINE}; {called(pair.a, pair.b)} {stands} in the way of a region in {rounds}"
 
 
 def refusal(reason: str, late: bool) -> CirisError:

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from certifier.broken import trouble
-from certifier.conditioned import called
+from certifier.conditions import called
 from certifier.growth.actions import Certify, Finish, Outcomes, Transition
 from certifier.growth.obstacles import Obstacle, joined
 from certifier.growth.options import ENOUGH, MOST_CELLS
@@ -134,7 +134,7 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     unknown = next((i for i in report.failures if i not in report.weaknesses), None)
     if unknown is not None:  # Nothing can be cut off for it, so it would fail again and again.
         pair = scene.pairs[unknown]
-        return _ended(state, report, f"{called(scene, pair)} could not be certified, and nothing is known of where they fail")
+        return _ended(state, report, f"{called(pair.a, pair.b)} could not be certified, and nothing is known of where they fail")
     failing = [i for i in report.failures if report.open_cells.get(i) != 0]
     made = _cut_off(scene, state, start, whole, report, failing)
     while (smaller_groups := _regrouped(scene, start, whole, report, _costly(whole, report, failing, made))) is not whole:
@@ -152,7 +152,7 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     state = replace(state, obstacles=joined(state.obstacles, _obstacles(whole.stage, failing, made)))
     if stuck and smaller is whole.polytope:
         pair = scene.pairs[failing[0]]
-        return _ended(state, report, f"{called(scene, pair)} could not be certified, and nothing more could be cut off for them")
+        return _ended(state, report, f"{called(pair.a, pair.b)} could not be certified, and nothing more could be cut off for them")
     if smaller is None:
         copy = _smaller_copy(scene, state, start)
         if copy is not None:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from certifier.conditions import called
 from certifier.errors import ProofError
 from certifier.model import Array, Pair, Scene
 from certifier.proof.map import MapProof, PairMap
@@ -89,7 +90,7 @@ def free_set(proof: MapProof) -> dict[str, Any]:
             about[pair].append(number)
     alone = next((pair for pair, numbers in about.items() if not numbers), None)
     if alone is not None:
-        message = f"{alone.a} and {alone.b} have no proved cell, so no configuration is proved to be free"
+        message = f"{called(alone.a, alone.b)}: no cell is proved, so no configuration is proved to be free"
         raise ProofError("not_covered", message, hint="let the map grow for longer")
     clauses: dict[tuple[int, ...], list[Pair]] = {}
     for pair, numbers in about.items():

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from certifier.conditions import NAMED, Condition, Cone, Distance, Inside, Range, is_condition_name
+from certifier.conditions import NAMED, Condition, Cone, Distance, InBall, Inside, Range, SlideRange, is_condition_name
 from certifier.errors import SceneError
 from certifier.scene import fields
 from certifier.scene.known import check_known, names_of
@@ -18,11 +18,15 @@ if TYPE_CHECKING:  # The command reads scene files without numpy, which the mode
 WORLD = "world"
 KEYS: Mapping[str, tuple[str, ...]] = {
     Cone.kind: ("body", "axis", "along", "of", "degrees"),
-    Inside.kind: ("what", "of", "box", "half_spaces"),
+    Inside.kind: ("what", "of", "box", "half_spaces", "ball"),
     Distance.kind: ("between", "metres"),
-    Range.kind: ("joints", "degrees"),
+    Range.kind: ("joints", "degrees", "metres"),
 }
 """The kinds of conditions, and what each is about."""
+
+
+ZONES = ("box", "half_spaces", "ball")
+"""The kinds of zones."""
 
 
 @dataclass(frozen=True)
@@ -116,13 +120,22 @@ def condition(entry: ConditionEntry, scene: Scene, swept: Collection[str]) -> Co
         case Inside.kind:
             what = said.get("what")
             if not isinstance(what, list) or not what:
-                raise fields.wrong(f"{where}.what", "must be a list of bodies or geometries, such as [arm/hand]")
+                hint = "a point of a body is {body: arm/hand, point: [0, 0, 0.1]}"
+                raise fields.wrong(f"{where}.what", "must be a list of bodies, geometries or points, such as [arm/hand]", hint=hint)
             of = _body(said.get("of", WORLD), f"{where}.of", scene)
             _check_not_swept(of, f"{where}.of", scene, swept)
-            named = [name for i, one in enumerate(what) for name in _geometries(one, f"{where}.what[{i}]", scene)]
+            kept = [(one, f"{where}.what[{i}]") for i, one in enumerate(what)]
+            points = tuple(_point_of(one, place, scene, swept) for one, place in kept if isinstance(one, dict))
+            named = dict.fromkeys(name for one, place in kept if not isinstance(one, dict) for name in _geometries(one, place, scene))
+            if [key in said for key in ZONES].count(True) != 1:
+                raise fields.wrong(where, f"must have one of {', '.join(ZONES)}")
+            if "ball" in said:
+                ball = fields.section(said["ball"], f"{where}.ball", ("center", "radius"))
+                radius = fields.number(ball.get("radius"), f"{where}.ball.radius", minimum=0.0)
+                return InBall(entry.name, tuple(named), of, _point(ball.get("center"), f"{where}.ball.center"), radius, points=points)
             zone = _zone(said, where)
             _check_room(zone, where)
-            return Inside(entry.name, tuple(dict.fromkeys(named)), of, zone)
+            return Inside(entry.name, tuple(named), of, zone, points=points)
         case Distance.kind:
             between = said.get("between")
             if not isinstance(between, list) or len(between) != 2:
@@ -131,14 +144,27 @@ def condition(entry: ConditionEntry, scene: Scene, swept: Collection[str]) -> Co
                 _geometries(one, f"{where}.between[{i}]", scene)
             a, b = between
             return Distance(entry.name, a, b, fields.number(said.get("metres"), f"{where}.metres", minimum=0.0))
-    joints, degrees = said.get("joints"), said.get("degrees")
+    joints = said.get("joints")
     if not isinstance(joints, dict) or not joints:
         raise fields.wrong(f"{where}.joints", "must map joints to 1 or -1, as in {arm/elbow: 1}")
-    if not isinstance(degrees, list) or len(degrees) != 2:
-        raise fields.wrong(f"{where}.degrees", "must be two angles in degrees, [lower, upper]")
     signed = tuple((_joint(name, f"{where}.joints", scene), _sign(sign, f"{where}.joints.{name}")) for name, sign in joints.items())
-    lower, upper = (math.radians(fields.number(x, f"{where}.degrees[{i}]")) for i, x in enumerate(degrees))
-    return Range(entry.name, signed, lower, upper)
+    if ("degrees" in said) == ("metres" in said):
+        raise fields.wrong(where, "must have either degrees, for joints that turn, or metres, for joints that slide")
+    unit = "degrees" if "degrees" in said else "metres"
+    if not isinstance(said[unit], list) or len(said[unit]) != 2:
+        raise fields.wrong(f"{where}.{unit}", f"must be two numbers in {unit}, [lower, upper]")
+    lower, upper = (fields.number(x, f"{where}.{unit}[{i}]") for i, x in enumerate(said[unit]))
+    if unit == "metres":
+        return SlideRange(entry.name, signed, lower, upper)
+    return Range(entry.name, signed, math.radians(lower), math.radians(upper))
+
+
+def _point_of(value: Any, where: str, scene: Scene, swept: Collection[str]) -> tuple[str, tuple[float, float, float]]:
+    """Returns a body, and a point in its frame."""
+    said = fields.section(value, where, ("body", "point"))
+    body = _body(said.get("body"), f"{where}.body", scene)
+    _check_not_swept(body, f"{where}.body", scene, swept)
+    return body, _point(said.get("point"), f"{where}.point")
 
 
 def _check_not_swept(body: str, where: str, scene: Scene, swept: Collection[str]) -> None:
@@ -164,8 +190,6 @@ def _direction(value: Any, where: str) -> tuple[float, float, float]:
 
 def _zone(said: Mapping[str, Any], where: str) -> tuple[tuple[float, float, float, float], ...]:
     """Returns the faces of a box, or the half-spaces themselves."""
-    if ("box" in said) == ("half_spaces" in said):
-        raise fields.wrong(where, "must have either box or half_spaces")
     if "box" in said:
         box = fields.section(said["box"], f"{where}.box", ("lower", "upper"))
         lower, upper = (_point(box.get(key), f"{where}.box.{key}") for key in ("lower", "upper"))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from certifier.conditioned import all_names, with_conditions, without_conditions
-from certifier.conditions import Inside, of_condition
+from certifier.conditions import InBall, Inside, SlideRange, of_condition
 from certifier.errors import ProofError, SceneError
 from certifier.model import JointKind, Scene
 
@@ -53,5 +53,8 @@ def conditions(scene: Scene, beyond_limits: bool = False) -> list[str]:
         beyond_limits: they are apart beyond the joint limits as well. What hangs on slides can be beyond all that stands for a zone there.
     """
     slides = beyond_limits and any(joint.kind is JointKind.PRISMATIC for joint in scene.moving)
-    where = {Inside.kind: ", at configurations within the joint limits"} if slides else {}
-    return [f"condition '{condition.name}': {condition}{where.get(condition.kind, '')}" for condition in scene.conditions]
+    where = ", at configurations within the joint limits" if slides else ""
+    return [
+        f"condition '{condition.name}': {condition}{where if isinstance(condition, Inside | InBall | SlideRange) else ''}"
+        for condition in scene.conditions
+    ]

@@ -7,6 +7,7 @@ import math
 import re
 from contextlib import suppress
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +18,11 @@ from hypothesis import strategies as st
 from pydrake.multibody.parsing import LoadModelDirectivesFromString, Parser, ProcessModelDirectives
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
+from scipy.spatial import ConvexHull
 
 from certifier.broken import trouble
-from certifier.conditioned import called, condition_of, tightened, with_conditions, without_conditions
-from certifier.conditions import Condition, Cone, Distance, Inside, Range, of_condition
+from certifier.conditioned import AROUND, COVERED, condition_of, tightened, with_conditions, without_conditions
+from certifier.conditions import Condition, Cone, Distance, InBall, Inside, Range, SlideRange, called, fails, of_condition
 from certifier.errors import ProofError, RegionError, SceneError
 from certifier.jobs import local
 from certifier.jobs.clearance import clearance
@@ -71,13 +73,21 @@ def room(scene: Scene, condition: Condition, q: Array) -> float:
         case Cone():
             a, b = X[condition.body][:3, :3] @ condition.axis, X[condition.of][:3, :3] @ condition.along
             return condition.angle - math.atan2(float(np.linalg.norm(np.cross(a, b))), float(a @ b))
-        case Inside():
+        case Inside() | InBall():
             inverse, least = np.linalg.inv(X[condition.of]), np.inf
-            for geometry in map(scene.geometry, condition.geometries):
-                pose = inverse @ X[geometry.body]
-                points = geometry.vertices @ pose[:3, :3].T + pose[:3, 3]
-                least = min([least, *(d - float((points @ (a, b, c)).max()) - geometry.radius for a, b, c, d in condition.faces)])
+            kept = [(geometry.body, geometry.vertices, geometry.radius) for geometry in map(scene.geometry, condition.geometries)]
+            for body, vertices, radius in [*kept, *((body, np.array([point]), 0.0) for body, point in condition.points)]:
+                pose = inverse @ X[body]
+                points = vertices @ pose[:3, :3].T + pose[:3, 3]
+                if isinstance(condition, InBall):
+                    least = min(least, condition.radius - float(np.linalg.norm(points - condition.center, axis=1).max()) - radius)
+                else:
+                    least = min([least, *(d - float((points @ (a, b, c)).max()) - radius for a, b, c, d in condition.faces)])
             return least
+        case SlideRange():
+            index = {joint.name: joint.index for joint in scene.moving}
+            total = float(sum(sign * q[index[joint]] for joint, sign in condition.joints))
+            return min(condition.upper - total, total - condition.lower)
         case Range():
             index = {joint.name: joint.index for joint in scene.moving}
             total = sum(sign * q[index[joint]] for joint, sign in condition.joints)
@@ -113,7 +123,7 @@ def direction(rng: np.random.Generator) -> tuple[float, float, float]:
 
 
 @settings(deadline=None, max_examples=60)
-@given(st.integers(0, 10**6), st.sampled_from(["cone", "inside", "range"]))
+@given(st.integers(0, 10**6), st.sampled_from(["cone", "inside", "points", "range", "slides"]))
 def test_pairs_are_apart_where_the_condition_holds(seed: int, kind: str) -> None:
     rng, tree = np.random.default_rng(seed), random_tree(seed)
     held = [body for body in tree.bodies if body != WORLD]
@@ -122,14 +132,19 @@ def test_pairs_are_apart_where_the_condition_holds(seed: int, kind: str) -> None
     scene = replace(tree, geometries=tuple(geometries))
     bodies = [body for body in scene.bodies if body != WORLD]
     one, other = str(rng.choice(bodies)), str(rng.choice(scene.bodies))
-    turning = [joint.name for joint in scene.moving if joint.kind is JointKind.REVOLUTE]
+    turning = [joint.name for joint in scene.moving if (joint.kind is JointKind.REVOLUTE) == (kind == "range")]
     condition: Condition
     if kind == "cone":
         condition = Cone("c", one, direction(rng), other, direction(rng), rng.uniform(0.01, 3.1))
-    elif kind == "inside":
-        names = [geometry.name for geometry in scene.geometries if geometry.body == one]
+    elif kind in ("inside", "points"):
+        names = [geometry.name for geometry in scene.geometries if geometry.body == one] if kind == "inside" else []
+        points = [(one, direction(rng)) for _ in range(rng.integers(1, 3))] if kind == "points" else []
         faces = tuple((*direction(rng), rng.uniform(-1.0, 3.0)) for _ in range(rng.integers(1, 5)))
-        condition = Inside("c", tuple(names), other, faces)
+        condition = Inside("c", tuple(names), other, faces, points=tuple(points))
+    elif kind == "slides":
+        signs = tuple((name, int(rng.choice([-1, 1]))) for name in turning if rng.random() < 0.7)
+        lower = rng.uniform(-1, 0.5)
+        condition = SlideRange("c", signs, lower, lower + rng.uniform(0.01, 1.0))
     else:
         signs = tuple((name, int(rng.choice([-1, 1]))) for name in turning if rng.random() < 0.7)
         lower = rng.uniform(-3, 3)
@@ -144,6 +159,45 @@ def test_pairs_are_apart_where_the_condition_holds(seed: int, kind: str) -> None
         assert all(room(scene, condition, at) > 0 for at in q), "no geometry reaches a face"
         return
     agree(scene, condition, q)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 10**6), st.booleans())
+def test_the_pairs_of_a_ball_are_apart_inside_of_it_alone(seed: int, of_a_point: bool) -> None:
+    """Where all of a body is within COVERED of the radius, they are apart."""
+    rng, tree = np.random.default_rng(seed), random_tree(seed)
+    moving = [joint.child for joint in tree.moving]
+    geometry = ball("c/ball", moving[-1], 0.2, rng.normal(size=3))
+    scene = replace(tree, geometries=(geometry,), pairs=())
+    names, points = ((), ((moving[-1], direction(rng)),)) if of_a_point else ((geometry.name,), ())
+    condition = InBall("c", names, WORLD, tuple(rng.normal(size=3).tolist()), rng.uniform(0.3, 4.0), points=points)
+    smaller = replace(condition, radius=COVERED * condition.radius)
+    q = rng.uniform(scene.q_lower, scene.q_upper, (200, scene.n))
+    conditioned: Scene | None = None
+    with suppress(SceneError):  # Nothing moves.
+        conditioned = with_conditions(scene, [condition])
+    if conditioned is None:
+        return
+    held = kept(scene, condition, q) if conditioned.pairs else np.ones(len(q), dtype=bool)
+    for at, apart in zip(q, held, strict=True):
+        assert not apart or room(scene, condition, at) > 0
+        assert apart or room(scene, smaller, at) < HAIR
+
+
+def test_the_directions_around_a_ball_leave_no_gap() -> None:
+    """Exact fractions: each triangle of their hull is farther from the middle than COVERED, and the middle is inside."""
+    exact = [[Fraction(x) for x in row] for row in AROUND.tolist()]
+    assert all(abs(sum(x * x for x in row) - 1) < Fraction(1, 10**14) for row in exact)
+    triangles = ConvexHull(AROUND).simplices
+    assert len(triangles) == 2 * len(AROUND) - 4, "they close a surface"
+    for i, j, k in triangles:
+        a, b, c = exact[i], exact[j], exact[k]
+        u, v = ([y - x for x, y in zip(a, other, strict=True)] for other in (b, c))
+        normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+        offset, length = sum(x * y for x, y in zip(normal, a, strict=True)), sum(x * x for x in normal)
+        assert offset**2 > Fraction(COVERED) ** 2 * length
+        side = [sum(x * y for x, y in zip(normal, row, strict=True)) - offset for row in exact]
+        assert all(x * (1 if offset < 0 else -1) >= -Fraction(1, 10**14) for x in side), "all of them are on one side"
 
 
 def test_drake_says_the_same_of_the_example() -> None:
@@ -209,6 +263,32 @@ def test_a_polytope_in_which_a_condition_fails_is_refused(conditioned: Scene, co
     assert local.certify(replace(base, pairs=()), polytope).outcome is Outcome.CERTIFIED
     failing = with_conditions(replace(base, pairs=()), wanted)
     assert local.certify(failing, polytope, cells=2000).outcome is Outcome.REFUTED
+
+
+def sliding(*conditions: Condition) -> Scene:
+    """Two slides along x, one behind the other, with a box."""
+    arm = planar_arm(2)
+    joints = tuple(replace(joint, kind=JointKind.PRISMATIC, axis=np.array([1.0, 0.0, 0.0])) for joint in arm.joints)
+    return with_conditions(replace(arm, joints=joints, pairs=()), conditions)
+
+
+TOTAL = SlideRange("total", (("arm/joint1", 1), ("arm/joint2", 1)), -0.25, 0.21)
+AWAY = SlideRange("away", (("arm/joint1", 1), ("arm/joint2", -1)), -0.21, 0.25)
+NEAR = InBall("near", (), WORLD, (2.0, 0.0, 0.0), 0.3, points=(("arm/link2", (1.0, 0.0, 0.0)),))
+NOSE = Inside("nose", (), WORLD, ((1.0, 0.0, 0.0, 2.21),), points=(("arm/link2", (1.0, 0.0, 0.0)),))
+
+
+@pytest.mark.parametrize("condition", [TOTAL, AWAY, NEAR, NOSE], ids=lambda one: one.name)
+def test_a_region_of_slides_keeps_sums_and_points_stay_in_zones(condition: Condition) -> None:
+    """With its infeasible twin: the cube goes to 0.2 in sum, and a larger one to 0.24 or 0.32."""
+    scene = sliding(condition)
+    grown = local.certify(scene, cube(scene, np.zeros(2), 0.1), assemble=True, cells=200)
+    assert grown.region is not None
+    assert f"condition '{condition.name}': {condition}" in verify_file(grown.region.proof).lines
+    assert local.certify(scene, cube(scene, np.zeros(2), 0.16 if condition is NEAR else 0.12), cells=2000).outcome is Outcome.REFUTED
+    outside = np.array([0.3, -0.1] if condition is AWAY else [0.2, 0.2])
+    with pytest.raises(RegionError, match=f"the condition '{condition.name}' is not kept: .* mm beyond"):
+        check_free(scene, outside, "seed.q")
 
 
 def test_motions_are_proved_to_keep_the_conditions_or_stop(conditioned: Scene) -> None:
@@ -464,6 +544,8 @@ def test_no_model_is_called_as_what_stands_for_conditions() -> None:
 
 
 def test_words_of_a_pair_name_both_bodies_or_the_condition(conditioned: Scene) -> None:
-    assert called(conditioned, conditioned.pairs[0]) == f"{conditioned.pairs[0].a} and {conditioned.pairs[0].b}"
-    assert called(conditioned, conditioned.pairs[-1]) == "the condition 'sum'"
+    first, last = conditioned.pairs[0], conditioned.pairs[-1]
+    assert called(first.a, first.b) == f"{first.a} and {first.b}"
+    assert called(last.a, last.b) == "the condition 'sum'"
+    assert [fails(pair.a, pair.b) for pair in (first, last)] == [f"{first.a} and {first.b} touch", "the condition 'sum' is not kept"]
     assert trouble(planar_arm(), Pair("a", "b")) == "a and b touch"

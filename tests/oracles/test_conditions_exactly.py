@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 
-from certifier.conditioned import condition_of, with_conditions
-from certifier.conditions import Condition, Cone, Distance, Inside, Range
+from certifier.conditioned import COVERED, condition_of, with_conditions
+from certifier.conditions import Condition, Cone, Distance, InBall, Inside, Range
 from certifier.model import WORLD, Pair, Scene
 from certifier.pair.collisions import in_collision
 from tests.certifier.scenes import ball, planar_arm
@@ -31,9 +31,13 @@ DIRECTION, FACE = (0.6, 0.0, 0.8), (0.0, 0.6, 0.8, 0.875)
 CONDITIONS: dict[str, Condition] = {
     "cone": Cone("c", "arm/link3", DIRECTION, WORLD, (0.0, 0.6, 0.8), 1.25),
     "inside": Inside("c", ("arm/link3/tip",), WORLD, (FACE, (1.0, 0.0, 0.0, 2.5))),
+    "point": Inside("c", (), WORLD, (FACE,), points=(("arm/link3", TIP),)),
+    "ball": InBall("c", ("arm/link3/tip",), WORLD, (0.5, -0.5, 0.25), 2.5),
     "distance": Distance("c", "arm/link3/tip", "world/post", 1.5),
     "range": Range("c", (("arm/joint1", 1), ("arm/joint2", -1), ("arm/joint3", 1)), -0.75, 1.25),
 }
+LOST = {"ball": (2.5 - RADIUS) ** 2 - (COVERED * 2.5 - RADIUS) ** 2}
+"""A polytope in the ball stands for it. So nothing is proved of what is as near to its surface as this."""
 
 
 def arm() -> Scene:
@@ -76,7 +80,11 @@ def room(kind: str, steps: list[int]) -> Fraction:
             turned = [dot(row, condition.axis) for row in R]
             return dot(turned, condition.along) - number(arb(condition.angle).cos())
         case Inside():
-            return min(d - Fraction(RADIUS) - dot(center, normal) for *normal, d in [map(Fraction, face) for face in condition.faces])
+            radius = Fraction(RADIUS if condition.geometries else 0)
+            return min(d - radius - dot(center, normal) for *normal, d in [map(Fraction, face) for face in condition.faces])
+        case InBall():
+            square = sum(((x - Fraction(y)) ** 2 for x, y in zip(center, condition.center, strict=True)), Fraction(0))
+            return Fraction(condition.radius - RADIUS) ** 2 - square
         case Distance():
             square = sum(((x - Fraction(y)) ** 2 for x, y in zip(center, POST, strict=True)), Fraction(0))
             return square - Fraction(2 * RADIUS + condition.metres) ** 2
@@ -118,7 +126,7 @@ def compare(kind: str, samples: int, proved: Condition | None = None) -> tuple[i
             left = room(kind, at)
         assert left > 0 or not apart, f"{kind}: proved at {at} / {STEPS}, where it fails by {float(left)}"
         near += abs(left) <= HAIR
-        assert apart or left <= HAIR, f"{kind}: not proved at {at} / {STEPS}, where it holds by {float(left)}"
+        assert apart or left <= LOST.get(kind, HAIR), f"{kind}: not proved at {at} / {STEPS}, where it holds by {float(left)}"
         holds, fails = holds + (left > 0), fails + (left <= 0)
     return holds, fails, near
 
@@ -131,7 +139,14 @@ def test_conditions_hold_exactly_where_their_pairs_are_apart(kind: str) -> None:
 
 @pytest.mark.parametrize(
     ("kind", "wider"),
-    [("cone", {"angle": 1.26}), ("inside", {"faces": (FACE,)}), ("distance", {"metres": 1.49}), ("range", {"upper": 1.26})],
+    [
+        ("cone", {"angle": 1.26}),
+        ("inside", {"faces": (FACE,)}),
+        ("point", {"points": (("arm/link3", (0.75, 0.25, -0.51)),)}),
+        ("ball", {"radius": 2.7}),
+        ("distance", {"metres": 1.49}),
+        ("range", {"upper": 1.26}),
+    ],
 )
 def test_a_wider_condition_is_seen(kind: str, wider: dict[str, Any]) -> None:
     with pytest.raises(AssertionError, match="where it fails"):

@@ -97,7 +97,7 @@ def test_the_commands_are_those_of_compose_and_keep_the_images_init() -> None:
     for name, container in CONTAINERS.items():
         assert "command" not in container, "it would take the place of tini"
         assert container["args"] == COMPOSE[name]["command"]
-    assert 'ENTRYPOINT ["tini", "--"]' in (ROOT / "Dockerfile").read_text()
+    assert 'ENTRYPOINT ["tini", "--", "ciris-entry"]' in (ROOT / "Dockerfile").read_text()
     assert all(find_spec(CONTAINERS[name]["args"][2]) for name in OURS[1:])
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from certifier.conditions import fails
 from certifier.growth.actions import Finish, Outcomes, Transition
 from certifier.growth.paper.pushes import further, less, next_push
 from certifier.growth.paper.rounds import after_round, next_round
@@ -59,7 +60,7 @@ def _after_contraction(scene: Scene, state: PaperState, start: Start, report: Ou
             return following
         if state.best is None and state.contractions >= len(starts):
             pair = scene.pairs[report.failures[0]]
-            reason = f"not even a small region around the seed can be certified: {pair.a} and {pair.b} are too close there"
+            reason = f"not even a small region around the seed can be certified: {fails(pair.a, pair.b, 'are too close')} there"
             return Transition(state, Finish(combine(list(report.outcomes.values())), reason))
     elif state.reach > 1 and not state.cuts.attempts:
         # The given polytope was pushed out and nothing had to be cut, so its faces go on outwards.

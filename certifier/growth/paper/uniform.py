@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from certifier.conditions import fails
 from certifier.growth.actions import Finish, Outcomes, Transition
 from certifier.growth.paper.state import Bisection, PaperState
 from certifier.growth.paper.trials import certify
@@ -48,7 +49,7 @@ def bisect(scene: Scene, state: PaperState, start: Start, report: Outcomes) -> T
     if bisection.certified is None:
         if scale == SMALLEST_SCALE:
             pair = scene.pairs[report.failures[0]]
-            reason = f"not even the smallest of the uniform contractions can be certified: {pair.a} and {pair.b} are too close there"
+            reason = f"not even the smallest of the uniform contractions can be certified: {fails(pair.a, pair.b, 'are too close')} there"
             return Transition(state, Finish(combine(list(report.outcomes.values())), reason))
         return shrink(scene, state, start, replace(bisection, scale=SMALLEST_SCALE))
     if bisection.steps == 0:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from certifier.conditions import Cone, Distance, Inside, Range
+from certifier.conditions import Cone, Distance, InBall, Inside, Range
 from certifier.errors import SceneError
 from certifier.model import Scene
 from certifier.scene.conditions import condition, constrained, swept_in
@@ -42,6 +42,9 @@ def test_the_example_means_what_it_says(scene: Scene) -> None:
     assert len(scene.pairs) == len(scene.body_pairs) + 7
 
 
+BOX = ((1, 0, 0, 1), (0, 1, 0, 1), (0, 0, 1, 1), (-1, 0, 0, 1), (0, -1, 0, 1), (0, 0, -1, 0))
+
+
 def test_all_kinds_are_read(tmp_path: Path) -> None:
     path = file(
         tmp_path,
@@ -52,7 +55,11 @@ def test_all_kinds_are_read(tmp_path: Path) -> None:
   - name: c
     distance: {between: [cup/cup, table/body], metres: 0.02}
   - name: d
-    range: {joints: {arm/elbow_joint: 1, arm/wrist_1_joint: -1}, degrees: [-200, 90]}""",
+    range: {joints: {arm/elbow_joint: 1, arm/wrist_1_joint: -1}, degrees: [-200, 90]}
+  - name: e
+    inside: {what: [{body: cup/cup, point: [0, 0, 0.1]}, arm/wrist_3], ball: {center: [0.1, 0, 0.2], radius: 0.9}}
+  - name: f
+    inside: {what: [{body: cup/cup, point: [0, 0, 0.1]}], box: {lower: [-1, -1, 0], upper: [1, 1, 1]}}""",
     )
     loaded = load_scene(path)
     assert loaded.conditions == (
@@ -60,7 +67,10 @@ def test_all_kinds_are_read(tmp_path: Path) -> None:
         Inside("b", ("cup/cup/wall", "arm/wrist_3/box"), "arm/base", ((0, 0, -1, 0.5),)),
         Distance("c", "cup/cup", "table/body", 0.02),
         Range("d", (("arm/elbow_joint", 1), ("arm/wrist_1_joint", -1)), math.radians(-200), math.radians(90)),
+        InBall("e", ("arm/wrist_3/box",), "world", (0.1, 0.0, 0.2), 0.9, points=(("cup/cup", (0.0, 0.0, 0.1)),)),
+        Inside("f", (), "world", BOX, points=(("cup/cup", (0.0, 0.0, 0.1)),)),
     )
+    assert Scene.from_document(loaded.to_document()).conditions == loaded.conditions
 
 
 @pytest.mark.parametrize(
@@ -76,7 +86,13 @@ def test_all_kinds_are_read(tmp_path: Path) -> None:
         ("cone: {axis: [0, 0, 1], along: [0, 0, 1], degrees: 5}", "scene_field", "cone.body", "text"),
         ("cone: {body: cup/cup, axis: [0, 0, 1], along: [0, 0, 1], of: lab, degrees: 5}", "unknown_name", "cone.of", "lab"),
         ("inside: {what: cup/cup, box: {lower: [0, 0, 0], upper: [1, 1, 1]}}", "scene_field", "inside.what", "list"),
-        ("inside: {what: [cup/cup]}", "scene_field", "inside", "either box or half_spaces"),
+        ("inside: {what: [cup/cup]}", "scene_field", "inside", "one of box, half_spaces, ball"),
+        ("inside: {what: [cup/cup], ball: {center: [0, 0, 0], radius: -1}}", "scene_field", "inside.ball.radius", "at least 0"),
+        ("inside: {what: [cup/cup], ball: {radius: 1}}", "scene_field", "inside.ball.center", "point"),
+        ("inside: {what: [{body: cup, point: [0, 0, 0]}], ball: {}}", "unknown_name", "inside.what[0].body", "cup"),
+        ("inside: {what: [{body: cup/cup}], ball: {}}", "scene_field", "inside.what[0].point", "point"),
+        ("range: {joints: {arm/elbow_joint: 1}}", "scene_field", "range", "either degrees"),
+        ("range: {joints: {arm/elbow_joint: 1}, metres: [0]}", "scene_field", "range.metres", "two numbers in metres"),
         ("inside: {what: [cup], box: {lower: [0, 0, 0], upper: [1, 1, 1]}}", "unknown_name", "inside.what[0]", "cup"),
         ("inside: {what: [cup/cup], box: {lower: [0, 0, 0], upper: [1, 0, 1]}}", "scene_field", "inside.box", "interior"),
         ("inside: {what: [cup/cup], box: {lower: [0, 0], upper: [1, 1, 1]}}", "scene_field", "inside.box.lower", "point"),
@@ -101,7 +117,7 @@ def test_all_kinds_are_read(tmp_path: Path) -> None:
         ("range: {joints: [arm/elbow_joint], degrees: [0, 1]}", "scene_field", "range.joints", "map joints"),
         ("range: {joints: {arm/elbow_joint: 2}, degrees: [0, 1]}", "scene_field", "range.joints.arm/elbow_joint", "1 or -1"),
         ("range: {joints: {arm/elbow: 1}, degrees: [0, 1]}", "unknown_name", "range.joints", "no joint that moves"),
-        ("range: {joints: {arm/elbow_joint: 1}, degrees: 90}", "scene_field", "range.degrees", "two angles"),
+        ("range: {joints: {arm/elbow_joint: 1}, degrees: 90}", "scene_field", "range.degrees", "two numbers in degrees"),
     ],
 )
 def test_errors_name_the_field(tmp_path: Path, scene: Scene, said: str, code: str, field: str, words: str) -> None:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from certifier.conditioned import with_conditions, without_conditions
-from certifier.conditions import Cone, Distance, Inside, Range, of_condition
+from certifier.conditions import Cone, Distance, InBall, Inside, Range, of_condition
 from certifier.errors import CirisError
 from certifier.jobs import local
 from certifier.jobs.map import grow_map
@@ -64,7 +64,7 @@ TABLE: list[Any] = [
 
 @cache
 def scene() -> Scene:
-    """An arm whose joints turn about z, y and x, with two cones, a zone that stands and one that moves, a distance and a range."""
+    """An arm whose joints turn about z, y and x, with two cones, zones that stand and that move, a ball, a distance and a range."""
     arm = planar_arm(3, limit=0.25)
     joints = tuple(replace(joint, axis=axis) for joint, axis in zip(arm.joints, np.eye(3)[::-1], strict=True))
     tip, post = ball("arm/link3/tip", "arm/link3", 0.125, (0.75, 0.25, -0.5)), ball("world/post", WORLD, 0.125, (1.5, 1.9, 0.25))
@@ -81,6 +81,8 @@ def scene() -> Scene:
             Inside("hood", (tip.name,), "arm/link1", ((0.0, 0.6, 0.8, 0.29), (1.0, 0.0, 0.0, 2.97))),
             Distance("clear", tip.name, post.name, 1.3),
             Range("sum", (("arm/joint1", 1), ("arm/joint2", -1), ("arm/joint3", 1)), -0.63, 0.63),
+            Inside("nose", (), "arm/link1", ((0.0, 0.0, 1.0, 0.05),), points=(("arm/link3", (0.75, 0.25, -0.5)),)),
+            InBall("reach", (tip.name,), WORLD, (-2.0, 0.0, 0.0), 5.15, points=(("arm/link3", (0.8, 0.0, 0.0)),)),
         ],
     )
 
@@ -161,6 +163,13 @@ class Parts:
             self.header["volumes"] = [self.header["volumes"][volume] for volume in used]
             for one in self.header["proofs"]:
                 one["volumes"] = [used.index(volume) for volume in one["volumes"]]
+            of_volumes = {name: name.split("/") for name in self.arrays if name.startswith("volume/")}
+            shapes = {name: self.arrays.pop(name) for name in of_volumes}
+            self.arrays |= {
+                f"volume/{used.index(int(of_volumes[name][1]))}/{of_volumes[name][2]}": shape
+                for name, shape in shapes.items()
+                if int(of_volumes[name][1]) in used
+            }
 
     def pack(self) -> bytes:
         return pack(fitting(self.header), self.arrays)

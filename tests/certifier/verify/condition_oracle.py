@@ -29,7 +29,9 @@ SAMPLES, TIMES, DRAWN = 60, 40, 4000
 """Of a polytope beside its corners, of each piece of a motion, and within the joint limits of a map."""
 _NUMBER = r"-?[\d.]+(?:e-?\d+)?"
 _VECTOR = rf"\(({_NUMBER}), ({_NUMBER}), ({_NUMBER})\)"
-_NAME, _NAMES = "'([^']*)'", "(?:'[^']*'(?:, )?)+"
+_NAME = "'([^']*)'"
+_POINT = rf"the point {_VECTOR} m of {_NAME}"
+_NAMES = r"(?:(?:the point \([^)]*\) m of )?'[^']*'(?:, )?)+"
 _LIMITED = ", at configurations within the joint limits"
 
 
@@ -116,13 +118,28 @@ def _cone(bodies: Bodies, *said: str) -> np.ndarray:
     return np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1)) - np.radians(float(said[4]))
 
 
+def _staying(bodies: Bodies, names: str) -> list[dict[str, Any]]:
+    """Returns the geometries and points that a sentence names."""
+    points = [{"body": body, "vertices": [[float(x) for x in at]], "radius": 0.0} for *at, body in re.findall(_POINT, names)]
+    found = []
+    for name in re.findall(_NAME, re.sub(_POINT, "", names)):
+        (geometry,) = [one for one in bodies.geometries(name) if one["name"] == name]
+        found.append(geometry)
+    return found + points
+
+
 def _zone(bodies: Bodies, names: str, faces: list[list[float]], of: str) -> np.ndarray:
     found = []
-    for name in re.findall(_NAME, names):
-        (geometry,) = [one for one in bodies.geometries(name) if one["name"] == name]
+    for geometry in _staying(bodies, names):
         points = bodies.points(geometry, of)
         found += [(points @ np.array(normal)).max(axis=1) + geometry["radius"] - d for *normal, d in faces]
     return np.max(found, axis=0)
+
+
+def _ball(bodies: Bodies, names: str, radius: str, *said: str) -> np.ndarray:
+    center, of = np.array(said[:3], dtype=float), said[3]
+    kept = [(bodies.points(geometry, of), geometry["radius"]) for geometry in _staying(bodies, names)]
+    return np.max([np.linalg.norm(points - center, axis=2).max(axis=1) + own for points, own in kept], axis=0) - float(radius)
 
 
 def _box(bodies: Bodies, names: str, *said: str) -> np.ndarray:
@@ -155,6 +172,7 @@ def _range(bodies: Bodies, total: str, lower: str, upper: str) -> np.ndarray:
 _SENTENCES: dict[str, Callable[..., np.ndarray]] = {
     rf"the direction {_VECTOR} of {_NAME} stays within ({_NUMBER}) degrees of {_VECTOR} of {_NAME}": _cone,
     rf"({_NAMES}) stays? in the box from {_VECTOR} to {_VECTOR} m, in the frame of {_NAME}": _box,
+    rf"({_NAMES}) stays? in the ball of ({_NUMBER}) m about {_VECTOR}, in the frame of {_NAME}": _ball,
     rf"({_NAMES}) stays? where (.*), in the frame of {_NAME}": _half_spaces,
     rf"{_NAME} and {_NAME} stay at least ({_NUMBER}) m apart": _distance,
     rf"(.*) stays from ({_NUMBER}) to ({_NUMBER}) degrees, but for whole turns": _range,

@@ -1,0 +1,29 @@
+"""Compiles ahead of time what jobs and plans call: ``python -m jobs.kernels``. The image keeps it, so a new container has it.
+
+What is compiled goes to ``NUMBA_CACHE_DIR``, or beside the sources. It is for processors like this machine's.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+from certifier.jobs import kernels
+
+CHILDREN = ("certifier.seeding.propose", "planner.sampling.child")
+"""These modules load Drake, so they are loaded in processes of their own."""
+
+
+def compile_all() -> None:
+    """Compiles what is not compiled yet.
+
+    Raises:
+        subprocess.CalledProcessError: a child has failed.
+    """
+    kernels.warm_up()
+    for module in CHILDREN:
+        subprocess.run([sys.executable, "-P", "-c", f"import {module} as module; module.warm_up()"], check=True)
+
+
+if __name__ == "__main__":
+    compile_all()
