@@ -229,8 +229,8 @@ def _numbers(value: Any, where: str, depth: int, most: int | None) -> Any:
             raise RegionError("option_value", "a path must have two waypoints at least", field=f"{where}[{i}]")
     if depth > 1:
         return tuple(_numbers(row, f"{where}[{i}]", depth - 1, most) for i, row in enumerate(value))
-    if not all(isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) for x in value):
-        raise RegionError("option_value", f"{where.rpartition('.')[2]} must be a list of finite numbers", field=where)
+    if not all(isinstance(x, int | float) and not isinstance(x, bool) for x in value):
+        raise RegionError("option_value", f"{where.rpartition('.')[2]} must be a list of numbers", field=where)
     return tuple(float(x) for x in value)
 
 

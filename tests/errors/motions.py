@@ -82,6 +82,7 @@ MOTIONS: Table = {
         lambda t: from_file(t, "path.json", '{"q": [[0, 0], [0, 1]], "t": [1, 0]}'),
         lambda t: from_file(t, "path.json", '{"knots": [0, 0, 1, 1], "control_points": [[0, 0], [0, 1]], "t": [0, 1]}'),
         lambda t: from_file(t, "path.csv", "0,0\n0,x\n"),
+        lambda t: from_file(t, "path.json", '{"q": [[0, 0], [0, "1"]]}'),
         lambda t: from_file(t, "path.csv", "elbow,shoulder\n0,0\n0,1\n"),
         lambda t: from_file(t, "path.csv", "0,0\n0\n"),
     ],

@@ -14,10 +14,13 @@ from certifier.growth.options import GrowthOptions
 from certifier.growth.state import GrowthState
 from certifier.isolation.child import run_in_child
 from certifier.jobs import local
+from certifier.jobs.map import ways_of
 from certifier.jobs.reference import Reference
+from certifier.map.options import MapOptions
 from certifier.model import Polytope, Scene
 from certifier.motion.given import given as moved
 from certifier.motion.splines import curve
+from certifier.options import read
 from certifier.polytopes.polytope import bound_multipliers, chebyshev_center
 from certifier.polytopes.sampling import hit_and_run
 from certifier.proof.motion import Space
@@ -119,6 +122,10 @@ REGIONS: Table = {
     ("point_outside", "contain"): [lambda t: step(slider(), slider().polytope([], []), {}, contain=np.array([[9.0]]))],
     ("seed_in_collision", "seed.q"): [lambda t: seeded(q=[1.5, 1.57]), lambda t: propose(crane(padding=9.0), SeedOptions(q=(0.0, 0.0)))],
     ("seed_outside_limits", "seed.q[0]"): [lambda t: seeded(q=[2.1, 0])],
+    ("seed_outside_window", "options.paths[0][1][0]"): [
+        lambda t: ways_of(t.scene(limit='<limit lower="-6" upper="6" effort="1" velocity="1"/>'), [[[0.0], [4.0]]])
+    ],
+    ("option_value", "options.paths[0]"): [lambda t: read(MapOptions, {"paths": [[[0.0]]]}, "options")],
     ("seed_outside_window", "seed.q[0]"): [
         lambda t: propose(t.scene(limit='<limit lower="-6" upper="6" effort="1" velocity="1"/>'), SeedOptions(q=(3.1,)))
     ],

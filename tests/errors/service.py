@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import time
+from dataclasses import replace
 from typing import Any
 
 from api.access import KEYS_SECONDS
@@ -115,6 +116,23 @@ def staged(t: Trial, name: str = "slider", posts: int = 1) -> None:
     write(t, lambda session: staging.stage(session, name, slider(posts=posts)))
 
 
+def constrained(t: Trial) -> None:
+    """Asks for a scene with a condition by the name of the scene without it."""
+    t.need("scene")
+    write(t, lambda session: scenes.add(session, slider()))
+    low = {"name": "low", "inside": {"what": ["model/cart"], "half_spaces": [[0, 0, 1, 9]]}}
+    t.ask("POST", "/v1/scenes/slider/constrain", json={"name": "slider", "conditions": [low]})
+
+
+def two_homes(t: Trial) -> None:
+    """Asks about the home of a scene by its id, which has another one under each of its names."""
+    (joint,) = (joint.name for joint in slider().moving)
+    for name, at in (("one", 0.1), ("two", 0.2)):
+        write(t, lambda session, name=name, at=at: scenes.add(session, replace(slider(name), configurations={"home": {joint: at}})))
+    t.need("scene")
+    t.ask("POST", "/v1/planning/contains", json={"q": ["home"], "scene": slider().hash[:16]})
+
+
 def promoted(t: Trial) -> None:
     staged(t)
     t.ask("POST", "/v1/scenes/slider/promote")
@@ -177,7 +195,12 @@ SERVICE: Table = {
     ],
     ("scene_not_found", "stage"): [lambda t: staged(t, name="slidr")],
     ("scene_name", "stage"): [lambda t: staged(t, name="slider@staged")],
-    ("scene_name", "name"): [lambda t: write(t, lambda session: scenes.add(session, slider("slider@staged")))],
+    ("scene_name", "name"): [
+        lambda t: write(t, lambda session: scenes.add(session, slider("slider@staged"))),
+        lambda t: write(t, lambda session: scenes.add(session, slider("../slider"))),
+        lambda t: constrained(t),
+    ],
+    ("configuration", "q[0]"): [two_homes],
     ("scene_unchanged", "stage"): [lambda t: staged(t, posts=2)],
     ("scene_without_regions", "without_regions"): [promoted],
     ("webhook_not_found", "job"): [lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/webhook")],
