@@ -28,7 +28,12 @@ def is_scene_name(text: object) -> bool:
 
     An id of a scene has 16 or 64 digits of 0-9a-f. Addresses of pages and requests contain names, and browsers resolve dots in them.
     """
-    return is_name(text) and not _ID.fullmatch(str(text)) and not {".", ".."} & set(str(text).split("/"))
+    return is_name(text) and not looks_like_id(str(text)) and not {".", ".."} & set(str(text).split("/"))
+
+
+def looks_like_id(text: str) -> bool:
+    """Returns whether this may be the id of a scene."""
+    return _ID.fullmatch(text) is not None
 
 
 def is_sentence(text: object) -> bool:

@@ -16,7 +16,7 @@ from sqlalchemy.orm import Session
 from certifier.configurations import Configurations
 from certifier.errors import SceneError, close_matches
 from certifier.model import Scene
-from certifier.names import SCENE_ALPHABET, is_scene_name
+from certifier.names import SCENE_ALPHABET, is_scene_name, looks_like_id
 from db import pages
 from db.ids import expanded
 from db.models import DEFAULT_PROJECT, SceneNameRow, SceneRow
@@ -154,17 +154,19 @@ def find(session: Session, given: str) -> str:
 
 def _exactly(session: Session, given: str) -> str | None:
     """Returns the scene that has this id, that the name means, or that ``NAME@ID`` is; None where there is none."""
+    if (version := _version(session, given)) is not None:
+        return version.scene_id
     found = session.scalar(select(SceneRow.id).where(SceneRow.id == given))
     if found is None and (named := meaning(session, given)) is not None:
         return named.scene_id
-    if found is None and (version := _version(session, given)) is not None:
-        return version.scene_id
     return found
 
 
 def _version(session: Session, given: str) -> SceneNameRow | None:
     """Returns the last version of a name that meant the scene with an id, for ``NAME@ID``; None for anything else."""
     name, _, scene_id = given.rpartition("@")
+    if not name or not looks_like_id(scene_id):
+        return None
     versions = select(SceneNameRow).where(SceneNameRow.name == name, SceneNameRow.scene_id == scene_id)
     return session.scalar(versions.order_by(SceneNameRow.version.desc()).limit(1))
 
@@ -176,7 +178,7 @@ def known(session: Session, given: str) -> Known:
         SceneError, CirisError: as :func:`find`.
     """
     scene_id = find(session, given)
-    if given != scene_id and (named := meaning(session, given) or _version(session, given)) is not None:
+    if given != scene_id and (named := _version(session, given) or meaning(session, given)) is not None:
         return Known(named.name, named.configurations, {})
     versions = select(SceneNameRow).where(SceneNameRow.scene_id == scene_id)
     last = {row.name: row.configurations for row in session.scalars(versions.order_by(SceneNameRow.version))}
