@@ -5,10 +5,11 @@ It is written with the change, in the same transaction.
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta
 from enum import StrEnum
 from uuid import uuid4
 
-from sqlalchemy import select
+from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
 from db import pages
@@ -17,6 +18,11 @@ from db.pages import Page
 
 COMMAND_LINE = "command line"
 """The name of a person in a shell with access to the database is not known."""
+
+KEPT_DAYS = 400
+"""A line stays for so many days: a year, and some days to look back at it."""
+TOGETHER = 1000
+"""At most this many lines are forgotten in one transaction."""
 
 
 class Action(StrEnum):
@@ -38,6 +44,17 @@ class Action(StrEnum):
 def note(session: Session, project: str, who: str, action: Action, what: str) -> None:
     """Adds a line to a project's log."""
     session.add(AuditRow(id=str(uuid4()), project=project, who=who, action=action, what=what))
+
+
+def forgettable(session: Session, now: datetime) -> bool:
+    """Returns whether some line is older than KEPT_DAYS."""
+    return session.scalar(select(AuditRow.id).where(AuditRow.created_at < now - timedelta(days=KEPT_DAYS)).limit(1)) is not None
+
+
+def forget(session: Session, now: datetime) -> None:
+    """Deletes some of the lines that are older than KEPT_DAYS."""
+    old = select(AuditRow.id).where(AuditRow.created_at < now - timedelta(days=KEPT_DAYS)).limit(TOGETHER)
+    session.execute(delete(AuditRow).where(AuditRow.id.in_(session.scalars(old).all())))
 
 
 def page(session: Session, after: str | None = None, limit: int = 100) -> Page[AuditRow]:

@@ -136,7 +136,7 @@ class AuditRow(Owned, Base):
     """
 
     __tablename__ = "audit"
-    __table_args__ = (Index(None, "project", "created_at", "id"),)
+    __table_args__ = (Index(None, "project", "created_at", "id"), Index(None, "created_at"))
 
     id: Mapped[str] = mapped_column(String(36), primary_key=True)
     who: Mapped[str]

@@ -15,7 +15,7 @@ from kombu.exceptions import OperationalError
 from sqlalchemy.exc import DBAPIError, TimeoutError
 from sqlalchemy.orm import Session
 
-from db import clock, events, jobs, keys, leases, pairs, projects, retention, work, workers
+from db import audit, clock, events, jobs, keys, leases, pairs, projects, retention, work, workers
 from db.models import JobRow, PairRow, StepRow
 from db.session import database
 from db.settings import settings
@@ -53,6 +53,7 @@ def do_round(holders: Holders, troubles: Troubles) -> None:
     chores = {
         "forgetting workers": forget_gone,
         "forgetting keys": forget_keys,
+        "forgetting what was done long ago": forget_audit,
         "expiry": expire,
         "giving room back": shrink,
     }
@@ -112,6 +113,15 @@ def forget_keys() -> None:
     if ids:
         with database().write() as session:
             keys.forget(session, ids)
+
+
+def forget_audit() -> None:
+    """Deletes some of the lines of the audit log that are too old."""
+    with database().read() as session:
+        old = audit.forgettable(session, utcnow())
+    if old:
+        with database().write() as session:
+            audit.forget(session, utcnow())
 
 
 def expire() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from sqlalchemy import inspect, select, text
 
@@ -109,6 +111,22 @@ def test_what_lists_show_of_a_region_survives_the_way_down_and_up(empty_database
     database = there_and_back(database, empty_database_url, "0026")
     with database.read() as session:
         assert regions.get(session, region_id).summary == summary
+    database.close()
+
+
+def test_named_configurations_survive_the_way_down_and_up(empty_database_url: str) -> None:
+    """Before, all names of a scene had one home; the way up gives it to each of them."""
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    (joint,) = (joint.name for joint in slider().moving)
+    with database.write() as session:
+        scene_id = scenes.add(session, replace(slider("one"), configurations={"home": {joint: 0.1}})).id
+        scenes.add(session, slider("two"))
+    database = there_and_back(database, empty_database_url, "0033")
+    with database.read() as session:
+        assert scenes.known(session, "one").configurations == {"home": {joint: 0.1}}
+        assert scenes.known(session, "two").configurations == {"home": {joint: 0.1}}
+        assert "configurations" not in scenes.get(session, scene_id).document
     database.close()
 
 
