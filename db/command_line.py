@@ -70,6 +70,13 @@ def check_there(url: str) -> None:
         raise CirisError("no_database", f"there is none at {parsed.database}", field="database", hint=hint)
 
 
+def path(text: str) -> Path:
+    """Returns the path that an argument names."""
+    if not text:
+        raise argparse.ArgumentTypeError("an empty text names nothing")
+    return Path(text)
+
+
 class Parser(argparse.ArgumentParser):
     """Says in one line what is wrong with arguments."""
 

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from enum import StrEnum
 from functools import partial
-from pathlib import Path
 
 from sqlalchemy import delete, exists, func, or_, select, update
 from sqlalchemy.exc import SQLAlchemyError
@@ -209,7 +208,7 @@ def _digest(key: str) -> str:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Runs ``ciris key`` on the database that the settings name."""
     parser = command_line.Parser(prog="ciris key", description="The API keys of the service whose database the settings name.")
-    parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")
+    parser.add_argument("--data", type=command_line.path, help="data directory; default: CIRIS_DATA_DIR")
     verbs = parser.add_subparsers(dest="verb", required=True)
     adding = verbs.add_parser("add", help="make a key and print it, once")
     adding.add_argument("name")

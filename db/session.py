@@ -242,19 +242,27 @@ def check_version(url: str) -> None:
             raise unusable.refusal(error, url) from None
 
 
+def make_directory(directory: Path) -> None:
+    """Makes the directory of an SQLite database where there is none. It is for its user alone.
+
+    Raises:
+        CirisError: data_directory.
+    """
+    try:
+        directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:
+        hint = "name a directory that you may write to, on a disk with room"
+        problem = f"{directory} cannot be made: {unreadable(error)}"
+        raise CirisError("data_directory", problem, field="CIRIS_DATABASE_URL", hint=hint) from None
+
+
 def _strict_json(value: Any) -> str:
     return json.dumps(value, allow_nan=False)
 
 
 def _sqlite(url: URL) -> tuple[Engine, Engine]:
     if url.database:
-        directory = Path(url.database).parent
-        try:
-            directory.mkdir(mode=0o700, parents=True, exist_ok=True)
-        except OSError as error:
-            hint = "name a directory that you may write to, on a disk with room"
-            problem = f"{directory} cannot be made: {unreadable(error)}"
-            raise CirisError("data_directory", problem, field="CIRIS_DATABASE_URL", hint=hint) from None
+        make_directory(Path(url.database).parent)
     engines = _engine(url, connect_args={"timeout": BUSY_SECONDS}), _engine(url, 1, connect_args={"timeout": BUSY_SECONDS})
     for engine, begin in zip(engines, ("BEGIN", "BEGIN IMMEDIATE"), strict=True):
         event.listen(engine, "connect", _configure_sqlite)

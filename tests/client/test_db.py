@@ -60,6 +60,17 @@ def test_there_and_back_with_a_backup(tmp_path: Path) -> None:
     database.close()
 
 
+def test_words_that_name_no_new_file_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for words, said in (
+        (["--data", str(tmp_path), "backup", ""], "error: argument file: an empty text names nothing (see ciris db backup --help)\n"),
+        (["--data", str(tmp_path), "restore", ""], "error: argument file: an empty text names nothing (see ciris db restore --help)\n"),
+        (["--data", "", "upgrade"], "error: argument --data: an empty text names nothing (see ciris db --help)\n"),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            commands.main(words)
+        assert (ended.value.code, capsys.readouterr().err) == (2, said)
+
+
 @pytest.mark.parametrize("words", [("downgrade", "0031"), ("backup", "file")])
 def test_a_misspelt_directory_is_refused(tmp_path: Path, words: tuple[str, ...]) -> None:
     done = db(tmp_path / "misspelt", *words)
