@@ -11,6 +11,7 @@ import hashlib
 import hmac
 import re
 import secrets
+import sys
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -22,12 +23,12 @@ from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from db import audit, command_line, pages, projects
+from db import audit, command_line, pages, projects, unusable
 from db.audit import COMMAND_LINE, Action
 from db.models import DEFAULT_PROJECT, ApiKeyRow, JobRow
 from db.pages import Page
 from db.session import Database
-from db.settings import Settings, settings
+from db.settings import Settings, chosen, settings
 from db.states import JOB, unfinished
 from db.types import utcnow
 
@@ -221,6 +222,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = parser.parse_args(arguments)
     for line in command_line.on_database(given.data, partial(_run, given=given)):
         print(line)
+    if given.verb != "add":  # a list may be empty because it is of another database than was meant
+        print(f"database: {unusable.named(chosen(given.data).database)}", file=sys.stderr)
 
 
 def _run(session: Session, given: argparse.Namespace) -> list[str]:

@@ -71,6 +71,12 @@ def by_a_few_characters(t: Trial) -> None:
         retention.delete_job(session, a_running_job(session).id[:8], dependents=True)
 
 
+def without_a_database(t: Trial) -> None:
+    t.need("ciris")
+    t.need("monkeypatch").delenv("CIRIS_DATA_DIR")
+    t.ciris("key", "ls", CIRIS_URL="http://127.0.0.1:9")
+
+
 def one_key_too_many(t: Trial) -> None:
     t.need("environment").setenv("CIRIS_MAX_KEYS_PER_PROJECT", "1")
     settings.cache_clear()
@@ -99,5 +105,6 @@ TEAMS: Table = {
     ("too_many_keys", "name"): [one_key_too_many],
     ("first_key", "name"): [lambda t: t.ask("POST", "/v1/keys", json={"name": "mine", "scope": "admin"})],
     ("bad_option", "--label"): [lambda t: t.ciris("job", "ls", "--label", "team")],
+    ("option", "CIRIS_URL"): [without_a_database],
     ("bad_option", "--data"): [lambda t: t.ciris("key", "ls", "--url", "http://127.0.0.1:9", "--data", "here")],
 }
