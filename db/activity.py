@@ -45,6 +45,8 @@ def of_jobs(session: Session, rows: Sequence[JobRow]) -> dict[str, str]:
             found[row.id] = queues.of_work(row.id)
         elif grown:
             found[row.id] = grown[0]
+        elif row.state == JobState.QUEUED:
+            found[row.id] = queues.of_begin(row.id)
         else:
             found[row.id] = queues.of_decisions(row.id)
     return found
@@ -64,6 +66,12 @@ class _Queues:
 
     def of_decisions(self, job_id: str) -> str:
         """Returns why nobody decides what the job does next."""
+        return self._why(WorkerKind.CONTROL, job_id)
+
+    def of_begin(self, job_id: str) -> str:
+        """Returns why nobody begins the job. One that nobody would work on afterwards comes to no better place by being begun."""
+        if (missing := self._missing(WorkerKind.CONTROL) or self._missing(WorkerKind.SOLVE)) is not None:
+            return f"{QUEUED}: {missing}"
         return self._why(WorkerKind.CONTROL, job_id)
 
     def _why(self, kind: WorkerKind, job_id: str) -> str:
