@@ -58,6 +58,7 @@ class _Queues:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._workers: dict[tuple[str, str], int] | None = None
+        self._queue_silent = False
         self._ahead: dict[WorkerKind, list[str]] = {}
 
     def of_work(self, job_id: str) -> str:
@@ -88,10 +89,11 @@ class _Queues:
         return f"{QUEUED}: next" if number == 0 else f"{QUEUED}: behind {number} {'other' if number == 1 else 'others'}"
 
     def _missing(self, kind: WorkerKind) -> str | None:
-        """Returns which worker is missing; None where one of this kind takes work."""
+        """Returns which worker is missing, or that none hears of work; None where one of this kind takes work."""
         if self._workers is None:
             self._workers = workers.counts(self._session)
-        return missing(self._workers, kind)
+            self._queue_silent = workers.miss_queue(self._session)
+        return missing(self._workers, kind) or ("the queue does not answer" if self._queue_silent else None)
 
 
 def missing(counts: dict[tuple[str, str], int], kind: WorkerKind) -> str | None:
