@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session
 from certifier.errors import CirisError
 from db import unusable
 from db.session import Database
-from db.settings import DATABASE_FIELD, chosen
+from db.settings import DATABASE_FIELD, Settings, chosen
 
 
 def on_database(data: Path | None, change: Callable[[Session], list[str]]) -> list[str]:
@@ -43,10 +43,7 @@ def on_url(data: Path | None, act: Callable[[str], list[str]]) -> list[str]:
         data: the data directory; None for that of the settings.
     """
     try:
-        settings = chosen(data)
-        if data is not None and settings.database_url:
-            hint = f"leave one of them out: the database would be that of {DATABASE_FIELD}"
-            raise CirisError("bad_option", f"does not go with {DATABASE_FIELD}", field="--data", hint=hint)
+        settings = settings_with(data)
         try:
             return act(settings.database)
         except unusable.ERRORS as error:
@@ -56,6 +53,19 @@ def on_url(data: Path | None, act: Callable[[str], list[str]]) -> list[str]:
     except CirisError as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(2)
+
+
+def settings_with(data: Path | None) -> Settings:
+    """Returns the settings of the environment, with this data directory; None for that of the settings.
+
+    Raises:
+        CirisError: bad_option, where the settings name a database that is in no data directory; setting.
+    """
+    settings = chosen(data)
+    if data is not None and settings.database_url:
+        hint = f"leave one of them out: the database would be that of {DATABASE_FIELD}"
+        raise CirisError("bad_option", f"does not go with {DATABASE_FIELD}", field="--data", hint=hint)
+    return settings
 
 
 def check_there(url: str) -> None:
