@@ -61,6 +61,7 @@ _STATUS_OF_CODE = {
     "quota_exceeded": HTTPStatus.TOO_MANY_REQUESTS,
     **dict.fromkeys(("busy", "no_room", "database_unavailable", "database_version"), HTTPStatus.SERVICE_UNAVAILABLE),
     **dict.fromkeys(("bad_request", "malformed_json"), HTTPStatus.BAD_REQUEST),
+    "too_slow": HTTPStatus.REQUEST_TIMEOUT,
     "not_found": HTTPStatus.NOT_FOUND,
     "method_not_allowed": HTTPStatus.METHOD_NOT_ALLOWED,
     "internal": HTTPStatus.INTERNAL_SERVER_ERROR,

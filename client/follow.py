@@ -121,7 +121,7 @@ def follow(client: Client, job_id: str, screen: Screen, watch: bool) -> Document
 def _saying_why_it_waits(client: Client, job_id: str, screen: Screen) -> Iterator[Callable[[], AbstractContextManager[None]]]:
     """Shows in the status line what a job waits for, when nothing has been heard of it for a while.
 
-    Yields what to open while an event is told, so that two threads never write at the same time.
+    Yields what to open while the command shows an event, so that two threads never write at the same time.
     """
     lock, ended, last = Lock(), Event(), time.monotonic()
 

@@ -70,7 +70,7 @@ class _Queues:
         return self._why(WorkerKind.CONTROL, job_id)
 
     def of_begin(self, job_id: str) -> str:
-        """Returns why nobody begins the job. One that nobody would work on afterwards comes to no better place by being begun."""
+        """Returns why nobody begins the job, or would work on it afterwards."""
         if (missing := self._missing(WorkerKind.CONTROL) or self._missing(WorkerKind.SOLVE)) is not None:
             return f"{QUEUED}: {missing}"
         return self._why(WorkerKind.CONTROL, job_id)

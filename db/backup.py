@@ -115,7 +115,7 @@ def _restore_sqlite(path: Path, place: Path) -> None:
 
 
 def _has_no_tables(place: Path) -> bool:
-    """Says whether a file is an SQLite database without tables, or with what is left when all have been taken away. It has no log."""
+    """Says whether an SQLite database that has no log has no tables, or only the empty one that `ciris db downgrade base` leaves."""
     try:
         with closing(sqlite3.connect(f"file:{place}?immutable=1", uri=True)) as there:
             tables = {name for (name,) in there.execute("SELECT name FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'")}
