@@ -11,7 +11,6 @@ from typing import Any
 from anyio import to_thread
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
-from starlette.middleware.gzip import GZipMiddleware
 
 from api import delivery, document, guard, login, problems
 from api.access import Keyring
@@ -26,6 +25,7 @@ from api.metrics import Requests
 from api.motions import MotionsKept
 from api.pages import site
 from api.pages.rendering import render_problem
+from api.parameters import KNOWN
 from api.probes import Probes
 from api.questions import LARGE, SMALL
 from api.reading import READERS
@@ -96,7 +96,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.announcer = Announcer()
     app.add_middleware(delivery.Unchanged)
     app.add_middleware(
-        GZipMiddleware,
+        delivery.Compressed,
         minimum_size=delivery.COMPRESSED_BYTES,
         compresslevel=delivery.COMPRESSION,
         exclude_content_types=delivery.NOT_COMPRESSED,
@@ -113,8 +113,8 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.add_middleware(AccessLog, requests=app.state.requests)
     problems.install(app, render_problem)
     for module in (scenes, jobs, results, webhooks, events, regions, cells, planning, plans, drawing, motions, project, workers, service):
-        app.include_router(module.router)
-    app.include_router(events.project)
+        app.include_router(module.router, dependencies=[KNOWN])
+    app.include_router(events.project, dependencies=[KNOWN])
     app.include_router(login.router)
     site.install(app)
     app.openapi = partial(document.describe, app)  # type: ignore[method-assign]

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from anyio import CancelScope
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES
+from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
 from starlette.routing import BaseRoute, Match
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -55,16 +55,54 @@ class Head:
             await self._app({**scope, "method": "GET"}, receive, without_body)
 
 
+class Compressed(GZipMiddleware):
+    """Compresses answers for those who take gzip, and lets nobody keep one for those who take another encoding.
+
+    The base class looks for the word in the header, and does not see a weight of 0, which refuses it. It leaves answers without a body
+    as they are, such as 304, which has to name what the whole answer depends on (RFC 9110, 15.4.5).
+    """
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http":
+            taken = b"gzip" if _takes_gzip(",".join(Headers(scope=scope).getlist("accept-encoding"))) else b"identity"
+            others = [(name, value) for name, value in scope["headers"] if name != b"accept-encoding"]
+            scope = {**scope, "headers": [*others, (b"accept-encoding", taken)]}
+
+        async def varied(message: Message) -> None:
+            if message["type"] == "http.response.start" and message["status"] == HTTPStatus.NOT_MODIFIED:
+                MutableHeaders(scope=message).add_vary_header("Accept-Encoding")
+            await send(message)
+
+        await super().__call__(scope, receive, varied)
+
+
+def _takes_gzip(given: str) -> bool:
+    """Says whether Accept-Encoding allows gzip: with a weight above 0, under its name or, where it is not named, as one of all others."""
+    weights = {}
+    for one in given.lower().split(","):
+        name, _, parameter = (part.strip() for part in one.partition(";"))
+        weights[name] = parameter.replace(" ", "").removeprefix("q=") if parameter else "1"
+    weight = weights.get("gzip", weights.get("*", "0"))
+    try:
+        return float(weight) > 0
+    except ValueError:
+        return False
+
+
 class Methods:
-    """This ASGI middleware makes ``Allow`` of a 405 name every method of the address. The router names those of one of its routes."""
+    """This ASGI middleware makes ``Allow`` of a 405 name every method of the address. The router names those of one of its routes.
+
+    Who serves files is no route, and names its methods itself.
+    """
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         async def complete(message: Message) -> None:
-            if message["type"] == "http.response.start" and message["status"] == HTTPStatus.METHOD_NOT_ALLOWED:
-                MutableHeaders(scope=message)["Allow"] = ", ".join(sorted(_allowed(scope)))
+            refused = message["type"] == "http.response.start" and message["status"] == HTTPStatus.METHOD_NOT_ALLOWED
+            if refused and (allowed := _allowed(scope)):
+                MutableHeaders(scope=message)["Allow"] = ", ".join(sorted(allowed))
             await send(message)
 
         await self._app(scope, receive, complete)

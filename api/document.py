@@ -40,7 +40,7 @@ PLACES = {
 """What may be wrong with a parameter, or a field of the body, of this name."""
 CHILDREN = ("busy", "child_timeout", "child_memory", "child_died")
 ALSO: dict[str, tuple[str, ...]] = {
-    "create_scene": ("bundle_too_large", "storage_quota", "bad_bundle", "scene_not_found", "scene_unchanged", *CHILDREN),
+    "create_scene": ("bundle_too_large", "storage_quota", "scene_not_found", "scene_unchanged", *CHILDREN),
     "promote_scene": ("scene_not_found", "scene_without_regions", "busy"),
     "delete_scene": ("has_dependents", "not_ended", "busy"),
     "create_job": ("idempotency_conflict", "quota_exceeded", "storage_quota", "region_not_found", "busy"),
@@ -143,7 +143,7 @@ def _codes(method: str, operation: dict[str, Any], schemas: dict[str, Any]) -> l
         for one in (schema, *schema.get("oneOf", ())):
             names |= set(schemas[one["$ref"].rpartition("/")[2]]["properties"]) if "$ref" in one else set()
     codes = [*ANYWHERE, *(WITH_KEY if operation.get("security") else ()), *(CHANGING if method != "get" else ())]
-    codes += WITH_BODY if content else ("invalid_request",) if names else ()
+    codes += WITH_BODY if content else ("invalid_request",) if operation.get("security") else ()
     codes += [code for name in sorted(names) for code in PLACES.get(name, ())]
     return list(dict.fromkeys([*codes, *ALSO.get(operation["operationId"], ())]))
 

@@ -160,6 +160,7 @@ def _of_rows(age: float, statistics: Statistics) -> list[str]:
         _family("ciris_workers", "gauge", "Workers that live, by kind and state.", _workers(statistics)),
         _family("ciris_workers_in_trouble", "gauge", "Workers of whose regular tasks one fails.", {(): statistics.workers_in_trouble}),
         _family("ciris_workers_wanted", "gauge", "Solving processes that would be busy now.", {(): statistics.workers_wanted}),
+        _family("ciris_jobs_without_solver", "gauge", "Jobs with work of which no solver does any.", {(): statistics.jobs_without_solver}),
         _family("ciris_decisions_due", "gauge", "Jobs that wait for a control worker.", {(): statistics.decisions_due}),
         _family("ciris_open_pieces", "gauge", "Pieces that wait, of iterations begun longer ago than.", _ages(statistics)),
         _family("ciris_oldest_open_piece_seconds", "gauge", "Age of what waits longest.", {(): max(statistics.waiting, default=0.0)}),

@@ -60,11 +60,21 @@ _STATUS_OF_CODE = {
     "too_many_requests": HTTPStatus.TOO_MANY_REQUESTS,
     "quota_exceeded": HTTPStatus.TOO_MANY_REQUESTS,
     **dict.fromkeys(("busy", "no_room", "database_unavailable", "database_version"), HTTPStatus.SERVICE_UNAVAILABLE),
-    "malformed_json": HTTPStatus.BAD_REQUEST,
+    **dict.fromkeys(("bad_request", "malformed_json"), HTTPStatus.BAD_REQUEST),
+    "too_slow": HTTPStatus.REQUEST_TIMEOUT,
+    "not_found": HTTPStatus.NOT_FOUND,
+    "method_not_allowed": HTTPStatus.METHOD_NOT_ALLOWED,
     "internal": HTTPStatus.INTERNAL_SERVER_ERROR,
 }
 
 RETRY_SECONDS = 5
+
+OF_THE_FRAMEWORK = {
+    HTTPStatus.NOT_FOUND: "not_found",
+    HTTPStatus.METHOD_NOT_ALLOWED: "method_not_allowed",
+    HTTPStatus.REQUEST_ENTITY_TOO_LARGE: "too_large",
+}
+"""The codes of errors that the framework makes. Any other is ``bad_request``, or ``internal``."""
 
 _DESCRIBED = "/openapi.json describes every request"
 _PLACES = {HTTPStatus.NOT_FOUND: "url", HTTPStatus.METHOD_NOT_ALLOWED: "method", HTTPStatus.REQUEST_ENTITY_TOO_LARGE: "body"}
@@ -157,6 +167,9 @@ def _validation(error: RequestValidationError) -> Problem:
     problems = [FieldProblem(field=_field((*e["loc"], "kind") if e["type"] in _TAGS else e["loc"]), message=_sentence(e)) for e in found]
     if any(e["type"] == "json_invalid" for e in found):
         return problem_of(CirisError("malformed_json", "the body is not JSON", field="body", hint=_DESCRIBED))
+    if isinstance(error.body, bytes):
+        hint = "send `Content-Type: application/json`"
+        return problem_of(CirisError("invalid_request", "the body is not said to be JSON", field="Content-Type", hint=hint))
     # Of the types that a field may have, the one that was meant is the one of which most was right.
     first = max(range(len(found)), key=lambda i: (found[i]["loc"][:2] == found[0]["loc"][:2], len(found[i]["loc"]), -i))
     meant = CirisError("invalid_request", problems[first].message, field=problems[first].field or "body", hint=_DESCRIBED)
@@ -165,7 +178,7 @@ def _validation(error: RequestValidationError) -> Problem:
 
 def _http(error: HTTPException) -> Problem:
     status = HTTPStatus(error.status_code)
-    code = "too_large" if status == HTTPStatus.REQUEST_ENTITY_TOO_LARGE else status.name.lower()
+    code = OF_THE_FRAMEWORK.get(status, "internal" if status >= HTTPStatus.INTERNAL_SERVER_ERROR else "bad_request")
     return problem_of(CirisError(code, error.detail, field=_PLACES.get(status), hint=_DESCRIBED), status)
 
 

@@ -32,6 +32,8 @@ Array = NDArray[Any]
 
 SCHEMA_VERSION = 1
 _STORED = "the document was changed or is of another version; load the scene from its file again"
+DESCRIPTIVE = frozenset({"name", "hash", "warnings", "provenance", "configurations"})
+"""Fields of a scene's document on which no proof depends."""
 WORLD = "world"
 
 
@@ -340,8 +342,7 @@ class Scene(ConfigurationSpace):
     @cached_property
     def hash(self) -> str:
         """Returns the SHA-256 over everything that a proof depends on, which its name, provenance and configurations are not."""
-        text = json.dumps(self._content(), sort_keys=True, separators=(",", ":"), allow_nan=False)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return hash_of(self._content())
 
     def _content(self) -> dict[str, Any]:
         other = self.other_paddings()
@@ -375,6 +376,13 @@ class Scene(ConfigurationSpace):
         if document.get("hash", scene.hash) != scene.hash:
             raise SceneError("scene_hash", "the scene's stored hash does not match its content", field="hash", hint=_STORED)
         return scene
+
+
+def hash_of(document: dict[str, Any]) -> str:
+    """Returns the hash of the scene of a document (:meth:`Scene.to_document`) without reading the scene, which takes longer."""
+    content = {name: value for name, value in document.items() if name not in DESCRIPTIVE}
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _plain(part: Joint | Geometry) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import certifier
-from certifier.errors import CirisError
+from certifier.errors import CirisError, unreadable
 from certifier.outcome import DEADLINE
 from ciris.find import api_key, data_dir, running_stack
 from ciris.synchronous.client import Client
@@ -120,14 +120,19 @@ def _stack() -> Iterator[str]:
         yield running
         return
     log = data_dir() / "logs" / "stack.log"
-    log.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        log.parent.mkdir(parents=True, exist_ok=True)
+        before = log.stat().st_size if log.exists() else 0
+    except OSError as error:
+        hint = "name a directory that you may write to"
+        raise CirisError("not_writable", f"{log.parent} cannot be made: {unreadable(error)}", field="CIRIS_DATA_DIR", hint=hint) from None
     print("starting the service (the first time, it compiles for a minute or two) ...", flush=True)
     with log.open("ab") as errors:
         stack = subprocess.Popen([sys.executable, "-P", "-m", "workers.stack"], stdout=subprocess.PIPE, stderr=errors, text=True)
     try:
         assert stack.stdout is not None
         if not stack.stdout.readline():
-            raise CirisError("stack_failed", "the service did not start", hint=f"see {log}")
+            raise CirisError("stack_failed", f"the service did not start{_last_error(log, before)}", hint=f"see {log}")
         url = running_stack(data_dir())
         assert url is not None, "a stack that says it is up has written down where"
         yield url
@@ -137,6 +142,12 @@ def _stack() -> Iterator[str]:
             stack.wait(STOP_SECONDS)
         except subprocess.TimeoutExpired:
             stack.kill()
+
+
+def _last_error(log: Path, start: int) -> str:
+    """Returns what the log says from here on about the error that ended the service; empty where it says nothing."""
+    said = [line for line in log.read_bytes()[start:].decode(errors="replace").splitlines() if line.startswith("error: ")]
+    return f": {said[-1].removeprefix('error: ')}" if said else ""
 
 
 def _answers(url: str) -> bool:

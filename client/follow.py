@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
+from threading import Event, Lock, Thread
 from typing import Any
 
 from certifier.conditions import called
+from certifier.errors import CirisError
 from certifier.outcome import Outcome, Stage
 from ciris.documents import Document
 from ciris.synchronous.client import Client
@@ -17,6 +22,9 @@ _STEPS = {
     "motion": "certifying the motion",
     "map": "growing the map",
 }
+SILENT_S, LOOK_S = 4.0, 1.0
+"""After this many seconds without an event the command asks what the job waits for, and how often it looks whether it is time to ask."""
+WAITING = ("queued", "stalled")
 _LOOK = "scout"
 """The step of a cover whose findings are printed instead of it."""
 
@@ -102,7 +110,43 @@ def follow(client: Client, job_id: str, screen: Screen, watch: bool) -> Document
     """Tells the job's events until the job has ended, and returns the ended job."""
     pairs = [called(pair["a"], pair["b"]) for pair in client.job_pairs(job_id, iteration=0)["pairs"]]
     teller = Teller(screen, pairs, watch)
-    for event in client.events(job_id):
-        teller.tell(event)
+    with _saying_why_it_waits(client, job_id, screen) as heard:
+        for event in client.events(job_id):
+            with heard():
+                teller.tell(event)
     screen.clear()
     return client.job(job_id)
+
+
+@contextmanager
+def _saying_why_it_waits(client: Client, job_id: str, screen: Screen) -> Iterator[Callable[[], AbstractContextManager[None]]]:
+    """Shows in the status line what a job waits for, when nothing has been heard of it for a while.
+
+    Yields what to open while the command shows an event, so that two threads never write at the same time.
+    """
+    lock, ended, last = Lock(), Event(), time.monotonic()
+
+    @contextmanager
+    def heard() -> Iterator[None]:
+        nonlocal last
+        with lock:
+            yield
+            last = time.monotonic()
+
+    def look() -> None:
+        while not ended.wait(LOOK_S):
+            if time.monotonic() - last < SILENT_S:
+                continue
+            with suppress(CirisError):
+                does = client.job(job_id)["status"]
+                with lock:
+                    if does.startswith(WAITING) and time.monotonic() - last >= SILENT_S and not ended.is_set():
+                        screen.status(f"job {does}")
+
+    looking = Thread(target=look, daemon=True)
+    looking.start()
+    try:
+        yield heard
+    finally:
+        ended.set()
+        looking.join(LOOK_S)

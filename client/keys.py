@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from argparse import Namespace
 
 from certifier.errors import CirisError
@@ -11,6 +12,8 @@ from client.commands import in_database
 from client.service import connect
 
 OK = 0
+DATABASES = ("CIRIS_DATABASE_URL", "CIRIS_DATA_DIR")
+"""Variables that say which database is meant."""
 
 
 def add(args: Namespace) -> int:
@@ -47,6 +50,14 @@ def _project(args: Namespace) -> list[str]:
 
 
 def _here(args: Namespace, words: list[str]) -> int:
+    """Acts on a database of this machine, or on that of CIRIS_DATABASE_URL.
+
+    Raises:
+        CirisError: option, where CIRIS_URL is all that says which keys are meant.
+    """
+    if os.environ.get("CIRIS_URL") and args.data is None and not any(map(os.environ.get, DATABASES)):
+        hint = "add --url URL for the keys of a service, or --data DIR for those of a database on this machine"
+        raise CirisError("option", "this command does not take its service from it", field="CIRIS_URL", hint=hint)
     args.module, args.words = "db.keys", lambda _: words
     return in_database(args)
 

@@ -45,6 +45,8 @@ def of_jobs(session: Session, rows: Sequence[JobRow]) -> dict[str, str]:
             found[row.id] = queues.of_work(row.id)
         elif grown:
             found[row.id] = grown[0]
+        elif row.state == JobState.QUEUED:
+            found[row.id] = queues.of_begin(row.id)
         else:
             found[row.id] = queues.of_decisions(row.id)
     return found
@@ -56,6 +58,7 @@ class _Queues:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._workers: dict[tuple[str, str], int] | None = None
+        self._queue_silent = False
         self._ahead: dict[WorkerKind, list[str]] = {}
 
     def of_work(self, job_id: str) -> str:
@@ -64,6 +67,12 @@ class _Queues:
 
     def of_decisions(self, job_id: str) -> str:
         """Returns why nobody decides what the job does next."""
+        return self._why(WorkerKind.CONTROL, job_id)
+
+    def of_begin(self, job_id: str) -> str:
+        """Returns why nobody begins the job, or would work on it afterwards."""
+        if (missing := self._missing(WorkerKind.CONTROL) or self._missing(WorkerKind.SOLVE)) is not None:
+            return f"{QUEUED}: {missing}"
         return self._why(WorkerKind.CONTROL, job_id)
 
     def _why(self, kind: WorkerKind, job_id: str) -> str:
@@ -80,10 +89,11 @@ class _Queues:
         return f"{QUEUED}: next" if number == 0 else f"{QUEUED}: behind {number} {'other' if number == 1 else 'others'}"
 
     def _missing(self, kind: WorkerKind) -> str | None:
-        """Returns which worker is missing; None where one of this kind takes work."""
+        """Returns which worker is missing, or that none hears of work; None where one of this kind takes work."""
         if self._workers is None:
             self._workers = workers.counts(self._session)
-        return missing(self._workers, kind)
+            self._queue_silent = workers.miss_queue(self._session)
+        return missing(self._workers, kind) or ("the queue does not answer" if self._queue_silent else None)
 
 
 def missing(counts: dict[tuple[str, str], int], kind: WorkerKind) -> str | None:

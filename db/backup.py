@@ -1,5 +1,7 @@
 """A backup is one SQLite file with every row of the database, proofs included, as of one moment. It does not matter of which kind the
-database was: the file can be restored into SQLite and into PostgreSQL.
+database was: the file can be restored into SQLite and into PostgreSQL. Behind the pages of SQLite, which does not look there, stands one
+line with the SHA-256 of all before it. Files of older versions have no such line, and the number that SQLite keeps for applications tells
+them from files that have lost it.
 
 A file is written beside its place and put there when it is whole and on the disk. A database is restored in one transaction, or put in
 place as a whole file. So what fails half way leaves everything as it was.
@@ -8,6 +10,7 @@ place as a whole file. So what fails half way leaves everything as it was.
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import shutil
 import sqlite3
@@ -21,14 +24,20 @@ from sqlalchemy.engine import make_url
 from sqlalchemy.types import NullType
 
 from certifier.errors import CirisError, unreadable
+from certifier.model import hash_of
 from db import migrate, version
-from db.session import Database
+from db.session import Database, make_directory
 from db.types import Utc
 
-_VERSIONS = "alembic_version"
+_FORGET_WORKERS = "DELETE FROM workers"
+_PART_BYTES = 2**20
 _ROWS, _LARGE_ROWS = 500, 1
 """This many rows are in memory at once; of tables with files, which may have 100 MB each, the second number."""
 _FIELD = "FILE"
+_APPLICATION, _APPLICATION_AT = 0x43495249, 68
+"""The number of files that have a digest, "CIRI" in ASCII, and where SQLite's format has it."""
+_SEAL = b"\nciris backup; sha256 of what stands before this line: "
+_SEAL_BYTES = len(_SEAL) + 65
 
 
 def backup(url: str, path: Path) -> str:
@@ -38,23 +47,28 @@ def backup(url: str, path: Path) -> str:
         CirisError: file_exists, unwritable, database_version; damaged_backup, when what was read is not whole.
     """
     if path.exists():
-        raise CirisError("file_exists", f"there is a file {path} already", field=_FIELD, hint="name another, or take this one away")
+        kind = "directory" if path.is_dir() else "file"
+        raise CirisError("file_exists", f"there is a {kind} {path} already", field=_FIELD, hint="name a file that is not there yet")
     database = Database(url)
     try:
         with _new_file(path) as partial:
             revision = (_backup_sqlite if database.sqlite else _backup_postgresql)(database, partial)
-            _check_whole(partial)
+            with closing(sqlite3.connect(partial)) as file:
+                file.execute("PRAGMA journal_mode=DELETE")  # so that the backup is one file
+                file.execute(f"PRAGMA application_id={_APPLICATION}")
+            _check_content(partial)
+            _seal(partial)
     finally:
         database.close()
     return revision
 
 
 def restore(url: str, path: Path) -> str:
-    """Fills a database that is empty from the file, and returns its revision.
+    """Fills a database that is empty from the file, and returns its revision. The workers of the file's database are none of this one.
 
     Raises:
         CirisError: not_a_backup, damaged_backup, unwritable; database_version, when this version does not know the file's revision;
-            not_empty, when the database has tables.
+            not_empty, when the database has tables; data_directory.
     """
     revision = _check_whole(path)
     parsed = make_url(url)
@@ -83,19 +97,31 @@ def _backup_postgresql(database: Database, partial: Path) -> str:
             _copy(source, target)
             for table, last in _last_ids(source).items():
                 target.exec_driver_sql("UPDATE sqlite_sequence SET seq = ? WHERE name = ?", (last, table))
-    with closing(sqlite3.connect(partial)) as file:
-        file.execute("PRAGMA journal_mode=DELETE")  # so that the backup is one file
     return revision
 
 
 def _restore_sqlite(path: Path, place: Path) -> None:
-    if place.exists():
-        with closing(sqlite3.connect(f"file:{place}?mode=ro", uri=True)) as there:
-            _check_empty(there.execute("SELECT count(*) FROM sqlite_master").fetchone()[0] == 0, str(place))
+    make_directory(place.parent)
     _check_empty(not place.with_name(f"{place.name}-wal").exists(), f"{place}-wal")
-    place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    _check_empty(not place.exists() or _has_no_tables(place), str(place))
     with _new_file(place) as partial:
         shutil.copyfile(path, partial)
+        if sealed(partial):
+            os.truncate(partial, partial.stat().st_size - _SEAL_BYTES)
+        with closing(sqlite3.connect(partial)) as file:
+            file.execute("PRAGMA application_id=0")
+            file.execute(_FORGET_WORKERS)
+            file.commit()
+
+
+def _has_no_tables(place: Path) -> bool:
+    """Says whether an SQLite database that has no log has no tables, or only the empty one that `ciris db downgrade base` leaves."""
+    try:
+        with closing(sqlite3.connect(f"file:{place}?immutable=1", uri=True)) as there:
+            tables = {name for (name,) in there.execute("SELECT name FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'")}
+            return not tables or (tables == {version.TABLE} and not there.execute(f"SELECT 1 FROM {version.TABLE}").fetchone())
+    except sqlite3.DatabaseError:
+        return False
 
 
 def _restore_postgresql(url: str, path: Path, revision: str) -> None:
@@ -104,7 +130,7 @@ def _restore_postgresql(url: str, path: Path, revision: str) -> None:
     try:
         with source_engine.connect() as source, migrate.connection_for_migrations(url) as target:
             target.exec_driver_sql("SET LOCAL idle_in_transaction_session_timeout = 0")
-            _check_empty(set(inspect(target).get_table_names()) <= {_VERSIONS}, target.engine.url.database or "")
+            _check_empty(set(inspect(target).get_table_names()) <= {version.TABLE}, target.engine.url.database or "")
             migrate.raise_to(target, revision)
             keys = target.exec_driver_sql(
                 "SELECT conrelid::regclass::text, quote_ident(conname) FROM pg_constraint WHERE contype = 'f'"
@@ -113,6 +139,7 @@ def _restore_postgresql(url: str, path: Path, revision: str) -> None:
             for table, key in keys:
                 target.exec_driver_sql(f"ALTER TABLE {table} ALTER CONSTRAINT {key} DEFERRABLE INITIALLY DEFERRED")
             _copy(source, target)
+            target.exec_driver_sql(_FORGET_WORKERS)
             target.exec_driver_sql("SET CONSTRAINTS ALL IMMEDIATE")
             for table, key in keys:
                 target.exec_driver_sql(f"ALTER TABLE {table} ALTER CONSTRAINT {key} NOT DEFERRABLE")
@@ -149,7 +176,7 @@ def _tables(connection: Connection) -> list[Table]:
                 column.type = Utc()
             elif isinstance(column.type, JSON):
                 column.type = NullType()
-    return [table for table in metadata.sorted_tables if table.name != _VERSIONS]
+    return [table for table in metadata.sorted_tables if table.name != version.TABLE]
 
 
 def _all(table: Table) -> Select[Any]:
@@ -159,7 +186,7 @@ def _all(table: Table) -> Select[Any]:
 def _last_ids(connection: Connection) -> dict[str, int]:
     """Returns the last id that each table which counts its rows has given, also to a row that is gone: clients may know it."""
     if connection.dialect.name == "sqlite":
-        counted = [table for table in inspect(connection).get_table_names() if table != _VERSIONS]
+        counted = [table for table in inspect(connection).get_table_names() if table != version.TABLE]
         last = {str(table): int(seq) for table, seq in connection.exec_driver_sql("SELECT name, seq FROM sqlite_sequence")}
         for table in counted:
             columns = {column["name"]: column["type"] for column in inspect(connection).get_columns(table)}
@@ -189,26 +216,76 @@ def _check_empty(empty: bool, what: str) -> None:
         raise CirisError("not_empty", f"{what} is not empty, and a backup would replace what it holds", field="database", hint=hint)
 
 
+def sealed(path: Path) -> bool:
+    """Says whether a backup has a digest of its content behind it; one of an older version has none.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - _SEAL_BYTES))
+        return file.read(len(_SEAL)) == _SEAL
+
+
+def _seal(path: Path) -> None:
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    with path.open("ab") as file:
+        file.write(_SEAL + f"{digest}\n".encode())
+
+
+def _check_seal(path: Path) -> None:
+    """Compares the content of a file with the digest behind it.
+
+    Raises:
+        CirisError: damaged_backup, also for a file that has lost its digest.
+        OSError: it cannot be read.
+    """
+    with path.open("rb") as file:
+        left = path.stat().st_size - _SEAL_BYTES
+        if not sealed(path):
+            file.seek(_APPLICATION_AT)
+            if file.read(4) == _APPLICATION.to_bytes(4, "big"):
+                raise _damaged(path, "its end is missing")
+            return
+        digest = hashlib.sha256()
+        while left > 0 and (part := file.read(min(left, _PART_BYTES))):
+            digest.update(part)
+            left -= len(part)
+        if file.read() != _SEAL + f"{digest.hexdigest()}\n".encode():
+            raise _damaged(path, "its content has another digest than when it was written")
+
+
 def _check_whole(path: Path) -> str:
-    """Returns the revision of a backup that is whole: its pages, its keys to other rows, and each proof by its digest.
+    """Returns the revision of a backup that is as it was written.
 
     Raises:
         CirisError: not_a_backup, damaged_backup, database_version.
     """
     try:
-        path.open("rb").close()
-        with closing(sqlite3.connect(f"file:{path.absolute()}?mode=ro", uri=True)) as file:
-            return _check_rows(file, path)
+        _check_seal(path)
     except OSError as error:
         raise CirisError("not_a_backup", f"{path}: {unreadable(error)}", field=_FIELD, hint="name a file of `ciris db backup`") from None
+    return _check_content(path)
+
+
+def _check_content(path: Path) -> str:
+    """Returns the revision of a backup that is whole: its pages, its keys to other rows, each proof and each scene by its digest.
+
+    Raises:
+        CirisError: not_a_backup, damaged_backup, database_version.
+    """
+    try:
+        with closing(sqlite3.connect(f"file:{path.absolute()}?mode=ro", uri=True)) as file:
+            return _check_rows(file, path)
     except sqlite3.DatabaseError as error:
         raise _damaged(path, str(error)) from None
 
 
 def _check_rows(file: sqlite3.Connection, path: Path) -> str:
-    if not file.execute("SELECT 1 FROM sqlite_master WHERE name = ?", (_VERSIONS,)).fetchone():
+    if not file.execute("SELECT 1 FROM sqlite_master WHERE name = ?", (version.TABLE,)).fetchone():
         raise CirisError("not_a_backup", f"{path} has no tables of ciris", field=_FIELD, hint="name a file of `ciris db backup`")
-    revision = file.execute(f"SELECT version_num FROM {_VERSIONS}").fetchone()
+    revision = file.execute(f"SELECT version_num FROM {version.TABLE}").fetchone()
     if revision is None or revision[0] not in version.revisions():
         raise version.refusal(revision and revision[0])
     (said,) = file.execute("PRAGMA integrity_check(1)").fetchone()
@@ -219,7 +296,18 @@ def _check_rows(file: sqlite3.Connection, path: Path) -> str:
     for digest, data in file.execute("SELECT digest, data FROM proofs"):
         if hashlib.sha256(data).hexdigest() != digest:
             raise _damaged(path, f"the proof {digest} has changed")
+    for scene_id, digest, document in file.execute("SELECT id, hash, document FROM scenes"):
+        if _hash_of_scene(document) != digest:
+            raise _damaged(path, f"the scene {scene_id} has changed")
     return str(revision[0])
+
+
+def _hash_of_scene(document: str) -> str | None:
+    """Returns the hash of a stored scene; None for what is no document of one."""
+    try:
+        return hash_of(json.loads(document))
+    except (ValueError, TypeError, AttributeError):
+        return None
 
 
 def _damaged(path: Path, why: str) -> CirisError:

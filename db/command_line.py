@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -14,9 +15,9 @@ from sqlalchemy.engine import make_url
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from db.disk import lacks_room
-from db.session import UNAVAILABLE, Database
-from db.settings import Settings
+from db import unusable
+from db.session import Database
+from db.settings import DATABASE_FIELD, Settings, chosen
 
 
 def on_database(data: Path | None, change: Callable[[Session], list[str]]) -> list[str]:
@@ -41,23 +42,30 @@ def on_url(data: Path | None, act: Callable[[str], list[str]]) -> list[str]:
     Args:
         data: the data directory; None for that of the settings.
     """
-    settings = Settings() if data is None else Settings(data_dir=data)
     try:
+        settings = settings_with(data)
         try:
             return act(settings.database)
-        except UNAVAILABLE as error:
-            raise _unavailable(error) from None
+        except unusable.ERRORS as error:
+            raise settings.placed(unusable.refusal(error, settings.database)) from None
+        except CirisError as error:
+            raise settings.placed(error) from None
     except CirisError as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(2)
 
 
-def _unavailable(error: Exception) -> CirisError:
-    """Returns what to say of an error of the database. A link's own words may have the password in them."""
-    if lacks_room(error):
-        return CirisError("no_room", "the disk is full, or cannot be written", field="database", hint="free some room; nothing was changed")
-    problem = f"the database cannot be used: {type(getattr(error, 'orig', None) or error).__name__}"
-    return CirisError("no_database", problem, field="CIRIS_DATABASE_URL", hint="does its server run, and are name and password right?")
+def settings_with(data: Path | None) -> Settings:
+    """Returns the settings of the environment, with this data directory; None for that of the settings.
+
+    Raises:
+        CirisError: bad_option, where the settings name a database that is in no data directory; setting.
+    """
+    settings = chosen(data)
+    if data is not None and settings.database_url:
+        hint = f"leave one of them out: the database would be that of {DATABASE_FIELD}"
+        raise CirisError("bad_option", f"does not go with {DATABASE_FIELD}", field="--data", hint=hint)
+    return settings
 
 
 def check_there(url: str) -> None:
@@ -67,9 +75,16 @@ def check_there(url: str) -> None:
         CirisError: no_database.
     """
     parsed = make_url(url)
-    if parsed.get_backend_name() == "sqlite" and not Path(parsed.database or "").exists():
+    if parsed.get_backend_name() == "sqlite" and not os.path.exists(parsed.database or ""):
         hint = "is it spelt so? `ciris up` and `ciris db upgrade` make one"
         raise CirisError("no_database", f"there is none at {parsed.database}", field="database", hint=hint)
+
+
+def path(text: str) -> Path:
+    """Returns the path that an argument names."""
+    if not text:
+        raise argparse.ArgumentTypeError("an empty text names nothing")
+    return Path(text)
 
 
 class Parser(argparse.ArgumentParser):

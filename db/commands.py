@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 
 from db import backup, command_line, migrate, version
 
@@ -12,13 +11,13 @@ from db import backup, command_line, migrate, version
 def main(arguments: Sequence[str] | None = None) -> None:
     """Runs ``ciris db`` on the database that the settings name."""
     parser = command_line.Parser(prog="ciris db", description="Migrates, backs up and restores the database that the settings name.")
-    parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")
+    parser.add_argument("--data", type=command_line.path, help="data directory; default: CIRIS_DATA_DIR")
     verbs = parser.add_subparsers(dest="verb", required=True)
     verbs.add_parser("upgrade", help="bring the tables to the newest revision")
     down = verbs.add_parser("downgrade", help="bring the tables to an older revision")
     down.add_argument("revision", help="base takes every table away")
     for verb, about in (("backup", "write every row into a new file"), ("restore", "fill an empty database from a backup")):
-        verbs.add_parser(verb, help=about).add_argument("file", type=Path)
+        verbs.add_parser(verb, help=about).add_argument("file", type=command_line.path)
     given = parser.parse_args(arguments)
     for line in command_line.on_url(given.data, lambda url: _run(url, given)):
         print(line)
@@ -41,7 +40,12 @@ def _run(url: str, given: argparse.Namespace) -> list[str]:
         case _:
             revision = backup.restore(url, given.file)
             newest = version.revisions()[-1]
-            return [f"restored at revision {revision}" + ("" if revision == newest else "; `ciris db upgrade` brings it to " + newest)]
+            lines = [f"restored at revision {revision}" + ("" if revision == newest else "; `ciris db upgrade` brings it to " + newest)]
+            if not backup.sealed(given.file):
+                lines.append(
+                    f"{given.file} is of an older version and has no digest: only its scenes and proofs could be compared with theirs"
+                )
+            return lines
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from certifier.errors import CirisError
 from certifier.outcome import Outcome
 from db import clock, events, labels, leases, pages, traces, webhooks
 from db.ids import found
-from db.models import GrowthRow, JobRow, SceneRow, StepRow
+from db.models import GrowthRow, JobRow, PairRow, SceneRow, StepRow
 from db.pages import Page
 from db.session import insert_new
 from db.settings import settings
@@ -334,6 +334,19 @@ def undecided(session: Session, limit: int) -> Sequence[str]:
     """Returns the ids of at most this many jobs that nobody has decided about, in the order in which they were made."""
     query = select(JobRow.id).where(JobRow.state == JobState.QUEUED).order_by(JobRow.created_at, JobRow.id)
     return session.scalars(query.limit(limit)).all()
+
+
+def untouched(session: Session, job: JobRow) -> bool:
+    """Says whether no worker has claimed any of the job's work yet."""
+    claimed = (exists().where(model.job_id == job.id, model.attempts > 0) for model in (StepRow, PairRow))
+    return not session.scalar(select(or_(*claimed)))
+
+
+def to_end(session: Session, now: datetime) -> list[str]:
+    """Returns the ids of the unfinished jobs that are being cancelled, or whose deadline has passed, and that nobody coordinates."""
+    due = or_(JobRow.state == JobState.CANCELLING, JobRow.deadline_at <= now)
+    rows = session.scalars(select(JobRow).where(JobRow.state.in_(unfinished(JOB)), due).order_by(JobRow.created_at))
+    return [job.id for job in rows if not is_coordinated(job, now)]
 
 
 def awaiting_coordination(session: Session, now: datetime) -> list[str]:

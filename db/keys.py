@@ -11,24 +11,24 @@ import hashlib
 import hmac
 import re
 import secrets
+import sys
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from enum import StrEnum
 from functools import partial
-from pathlib import Path
 
 from sqlalchemy import delete, exists, func, or_, select, update
 from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from db import audit, command_line, pages, projects
+from db import audit, command_line, pages, projects, unusable
 from db.audit import COMMAND_LINE, Action
 from db.models import DEFAULT_PROJECT, ApiKeyRow, JobRow
 from db.pages import Page
 from db.session import Database
-from db.settings import Settings, settings
+from db.settings import Settings, chosen, settings
 from db.states import JOB, unfinished
 from db.types import utcnow
 
@@ -209,7 +209,7 @@ def _digest(key: str) -> str:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Runs ``ciris key`` on the database that the settings name."""
     parser = command_line.Parser(prog="ciris key", description="The API keys of the service whose database the settings name.")
-    parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")
+    parser.add_argument("--data", type=command_line.path, help="data directory; default: CIRIS_DATA_DIR")
     verbs = parser.add_subparsers(dest="verb", required=True)
     adding = verbs.add_parser("add", help="make a key and print it, once")
     adding.add_argument("name")
@@ -222,6 +222,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = parser.parse_args(arguments)
     for line in command_line.on_database(given.data, partial(_run, given=given)):
         print(line)
+    if given.verb != "add":  # a list may be empty because it is of another database than was meant
+        print(f"database: {unusable.named(chosen(given.data).database)}", file=sys.stderr)
 
 
 def _run(session: Session, given: argparse.Namespace) -> list[str]:

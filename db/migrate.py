@@ -15,7 +15,7 @@ from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
-from sqlalchemy import Connection, event
+from sqlalchemy import Connection, event, inspect
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
@@ -93,11 +93,14 @@ def known_revision(connection: Connection) -> str | None:
     """Returns the revision of a database; None where it has no tables.
 
     Raises:
-        CirisError: database_version, when this version of the program does not know it.
+        CirisError: database_version, when this version of the program does not know it; not_empty, where the tables are another program's.
     """
     current = MigrationContext.configure(connection).get_current_revision()
     if current is not None and current not in version.revisions():
         raise version.refusal(current)
+    if current is None and (others := sorted(set(inspect(connection).get_table_names()) - {version.TABLE})):
+        problem = f"the database has tables of another program: {', '.join(others[:3])}{', ...' if len(others) > 3 else ''}"
+        raise CirisError("not_empty", problem, field="CIRIS_DATABASE_URL", hint="name a database that ciris has for itself")
     return current
 
 

@@ -9,7 +9,6 @@ import argparse
 import re
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from sqlalchemy import ColumnElement, select
@@ -73,7 +72,7 @@ def expires() -> ColumnElement[bool]:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Runs ``ciris project`` on the database that the settings name."""
     parser = command_line.Parser(prog="ciris project", description="The projects of the service whose database the settings name.")
-    parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")
+    parser.add_argument("--data", type=command_line.path, help="data directory; default: CIRIS_DATA_DIR")
     verbs = parser.add_subparsers(dest="verb", required=True)
     verbs.add_parser("add", help="make a project").add_argument("name")
     verbs.add_parser("ls", help="list the projects with their limits").add_argument("--json", action="store_true")

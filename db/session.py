@@ -22,7 +22,7 @@ import copy
 import json
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -30,10 +30,11 @@ from typing import Any
 from sqlalchemy import Connection, Dialect, Engine, QueuePool, create_engine, event, text
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.engine import URL, make_url
-from sqlalchemy.exc import DisconnectionError, InterfaceError, OperationalError, TimeoutError
+from sqlalchemy.exc import DatabaseError, DisconnectionError, InterfaceError, OperationalError, TimeoutError
 from sqlalchemy.orm import DeclarativeBase, ORMExecuteState, Session, with_loader_criteria
 
-from db import version
+from certifier.errors import CirisError, unreadable
+from db import unusable, version
 from db.disk import Disk
 from db.models import Owned
 from db.settings import settings
@@ -102,6 +103,9 @@ class Database:
     Attributes:
         disk: the disk of an SQLite database; that of a PostgreSQL server is not looked at.
         project: sessions find the rows of this project only; None for all rows.
+
+    Raises:
+        CirisError: data_directory, where the directory of an SQLite database is missing and cannot be made.
     """
 
     def __init__(self, url: str) -> None:
@@ -226,10 +230,30 @@ def check_version(url: str) -> None:
     """Refuses a database of another version. One that cannot be reached yet is refused later, by who writes to it.
 
     Raises:
-        CirisError: database_version.
+        CirisError: database_version, data_directory; no_database, for a file that is none.
     """
-    with closing(Database(url)) as tried, suppress(*UNAVAILABLE), tried.read() as session:
-        version.check(session)
+    with closing(Database(url)) as tried:
+        try:
+            with tried.read() as session:
+                version.check(session)
+        except UNAVAILABLE:
+            return
+        except DatabaseError as error:
+            raise unusable.refusal(error, url) from None
+
+
+def make_directory(directory: Path) -> None:
+    """Makes the directory of an SQLite database where there is none. It is for its user alone.
+
+    Raises:
+        CirisError: data_directory.
+    """
+    try:
+        directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:
+        hint = "name a directory that you may write to, on a disk with room"
+        problem = f"{directory} cannot be made: {unreadable(error)}"
+        raise CirisError("data_directory", problem, field="CIRIS_DATABASE_URL", hint=hint) from None
 
 
 def _strict_json(value: Any) -> str:
@@ -238,7 +262,7 @@ def _strict_json(value: Any) -> str:
 
 def _sqlite(url: URL) -> tuple[Engine, Engine]:
     if url.database:
-        Path(url.database).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        make_directory(Path(url.database).parent)
     engines = _engine(url, connect_args={"timeout": BUSY_SECONDS}), _engine(url, 1, connect_args={"timeout": BUSY_SECONDS})
     for engine, begin in zip(engines, ("BEGIN", "BEGIN IMMEDIATE"), strict=True):
         event.listen(engine, "connect", _configure_sqlite)

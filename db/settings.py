@@ -11,9 +11,12 @@ from pathlib import Path
 from typing import Annotated
 from urllib.parse import urlsplit
 
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+from sqlalchemy.engine import make_url
+from sqlalchemy.exc import ArgumentError
 
+from certifier.errors import CirisError
 from db import machine
 
 
@@ -59,7 +62,32 @@ def _hosts(given: object) -> object:
 
 Hosts = Annotated[tuple[Host, ...], NoDecode, BeforeValidator(_hosts)]
 
+DATABASES = {("sqlite", "pysqlite"), ("postgresql", "psycopg")}
+"""The kinds of database that the service works with, and the drivers that it has."""
+
+
+def _database_url(given: str) -> str:
+    """Refuses what names no database. Its words repeat nothing of the URL, which may have a password in it."""
+    if not given:
+        return given
+    forms = "write postgresql+psycopg://user:password@host:port/name or sqlite:////directory/file"
+    try:
+        parsed = make_url(given)
+        kind = parsed.get_backend_name(), parsed.get_driver_name()
+    except (ArgumentError, ValueError):
+        raise ValueError(f"it is no URL of a database; {forms}") from None
+    if kind not in DATABASES:
+        raise ValueError(f"the service knows no database {parsed.drivername!r}; {forms}")
+    if parsed.database in (None, "", ":memory:"):
+        raise ValueError(f"it names no database; {forms}")
+    return given
+
+
 LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
+
+
+DATABASE_FIELD = "CIRIS_DATABASE_URL"
+"""Errors about the database name this setting."""
 
 
 class Settings(BaseSettings):
@@ -69,7 +97,7 @@ class Settings(BaseSettings):
 
     data_dir: Path = Field(default_factory=_data_dir)
     """The embedded stack keeps its database, its queue, its logs and stack.json in this directory."""
-    database_url: str = ""
+    database_url: Annotated[str, AfterValidator(_database_url)] = ""
     """SQLAlchemy URL of the database; empty: SQLite in ``data_dir``. PostgreSQL: postgresql+psycopg://user:password@host/name.
     With TLS, ``?sslmode=verify-full&sslrootcert=FILE`` follows."""
     redis_url: str = ""
@@ -141,8 +169,34 @@ class Settings(BaseSettings):
         """Returns the database's URL, with the default filled in."""
         return self.database_url or f"sqlite:///{self.data_dir.expanduser().absolute() / 'ciris.sqlite3'}"
 
+    def placed(self, error: CirisError) -> CirisError:
+        """Returns an error about the database with the setting in it that names the database here."""
+        if error.field == DATABASE_FIELD and not self.database_url:
+            error.field = "--data"
+        return error
+
 
 @cache
 def settings() -> Settings:
-    """Returns the process's settings. ``settings.cache_clear()`` makes the next call read the environment again."""
-    return Settings()
+    """Returns the process's settings. ``settings.cache_clear()`` makes the next call read the environment again.
+
+    Raises:
+        CirisError: setting.
+    """
+    return chosen()
+
+
+def chosen(data_dir: Path | None = None) -> Settings:
+    """Returns the settings of the environment, with another data directory where one is given.
+
+    Raises:
+        CirisError: setting, which names the first variable whose value cannot be used.
+    """
+    try:
+        return Settings() if data_dir is None else Settings(data_dir=data_dir)
+    except ValidationError as error:
+        first = error.errors(include_input=False, include_url=False)[0]
+        name = f"CIRIS_{first['loc'][0]}".upper()
+        message = str(first["msg"]).removeprefix("Value error, ")
+        hint = "correct it, or take it out of the environment"
+        raise CirisError("setting", f"{message[:1].lower()}{message[1:]}", field=name, hint=hint) from None

@@ -59,6 +59,7 @@ class Statistics:
         workers: the workers that live, by kind and state.
         workers_in_trouble: how many workers say that something of what they do again and again fails.
         workers_wanted: how many solving processes would be busy now if there were enough.
+        jobs_without_solver: how many jobs have work of which no solver does any.
     """
 
     jobs: dict[str, int]
@@ -73,6 +74,7 @@ class Statistics:
     workers: dict[tuple[str, str], int]
     workers_in_trouble: int
     workers_wanted: int
+    jobs_without_solver: int
 
 
 def collect(session: Session) -> Statistics:
@@ -103,6 +105,7 @@ def collect(session: Session) -> Statistics:
         workers=workers.counts(session),
         workers_in_trouble=workers.in_trouble(session),
         workers_wanted=work.busy_solvers(session, batch_seconds=settings().batch_seconds),
+        jobs_without_solver=work.jobs_without_solver(session),
     )
 
 

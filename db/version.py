@@ -18,7 +18,9 @@ from certifier.errors import CirisError
 
 LOCK = 0x43495249
 """"CIRI" in ASCII: who migrates a PostgreSQL database holds this advisory lock alone, and who writes shares it with others."""
-_READ = "SELECT version_num FROM alembic_version"
+TABLE = "alembic_version"
+"""The table that says at which revision the database is."""
+_READ = f"SELECT version_num FROM {TABLE}"
 _NO_TABLE = "42P01"
 """PostgreSQL's name for a table that is not there."""
 
@@ -61,6 +63,8 @@ def refusal(found: str | None) -> CirisError:
         problem, hint = f"the database has no tables of ciris, and version {version('ciris')} needs them", "`ciris db upgrade` makes them"
     elif found in known:
         hint = "make a backup (`ciris db backup`), stop all processes of the older version, and call `ciris db upgrade`"
+    elif not found.isdecimal():
+        problem, hint = f"the database is at revision {found}, which is another program's", "name a database that ciris has for itself"
     elif found < known[0]:
         hint = "start version 0.1.0 of ciris on it once, then call `ciris db upgrade`"
     else:

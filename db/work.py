@@ -140,6 +140,13 @@ def busy_solvers(session: Session, *, batch_seconds: float) -> int:
     return held + batches + (steps_open or 0) + (regions or 0)
 
 
+def jobs_without_solver(session: Session) -> int:
+    """Returns how many jobs have work of which no solver does any."""
+    done = exists().where(StepRow.job_id == JobRow.id, StepRow.state == StepState.RUNNING)
+    waiting = select(func.count()).select_from(JobRow).where(_has_work(), JobRow.running_pairs == 0, ~done)
+    return session.scalar(waiting, {"now": utcnow()}) or 0
+
+
 def served_by_now(session: Session) -> float:
     """Returns what a job that starts now counts as served, so that it is neither ahead of those that wait for work nor behind them."""
     waiting = session.scalar(_least_served(), {"now": utcnow()})

@@ -26,6 +26,10 @@ GONE_SECONDS = 60.0
 """A worker that has said nothing for this many seconds is gone."""
 
 
+REACHING_QUEUE = "reaching the queue"
+"""What a control worker that the queue does not answer says that fails."""
+
+
 class WorkerKind(StrEnum):
     """Says which queue a worker serves."""
 
@@ -150,6 +154,12 @@ def solvers(session: Session) -> int:
 def in_trouble(session: Session) -> int:
     """Returns how many of the workers that live say that something fails."""
     return session.scalar(select(func.count()).select_from(WorkerRow).where(_lives(session), WorkerRow.trouble.is_not(None))) or 0
+
+
+def miss_queue(session: Session) -> bool:
+    """Says whether the queue does not answer a worker that lives."""
+    said = select(WorkerRow.id).where(_lives(session), WorkerRow.trouble.contains(REACHING_QUEUE))
+    return session.scalar(said.limit(1)) is not None
 
 
 def _lives(session: Session) -> ColumnElement[bool]:

@@ -129,8 +129,8 @@ class Map(Kind):
         return {LEAD: lead, PIECE: piece, ACCEPT: accept}[claim.kind](claim, scene)
 
     def is_late(self, session: Session, job: JobRow, now: datetime) -> bool:
-        """Says whether the deadline ends the job. The process that leads it has some time to end by itself."""
-        return job.deadline_at is not None and job.deadline_at + GRACE <= now
+        """Says whether the deadline ends the job. A process that leads it, or has, gets some time to end it by itself."""
+        return super().is_late(session, job, now) and (super().is_late(session, job, now - GRACE) or jobs.untouched(session, job))
 
     def stop(self, session: Session, job: JobRow, afterwards: Afterwards) -> None:
         """Has what was found until now stored."""

@@ -37,6 +37,7 @@ from db.session import database
 from db.settings import settings
 from db.states import LEAD, StepState, WorkerState
 from db.transaction import persistently
+from jobs.failures import not_begun
 from jobs.kind import Done
 from jobs.scenes import load_scene
 from workers.app import send_work
@@ -134,6 +135,8 @@ def lead(claim: steps.Claim, scene: Scene) -> Done:
     try:
         leading.saving(lambda session, job: maps.forget(session, job.id))  # what a process that died has posted is posted anew
         if (reason := leading.over()) is not None:
+            if account is NOTHING:
+                raise not_begun()
             return Done({"ended": reason, "reached": False})
         led = _resumed(claim.job_id, scene, options)
         if led.begins:

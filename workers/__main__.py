@@ -45,10 +45,6 @@ def main() -> None:
     from workers.tasks import register
     from workers.troubles import Troubles
 
-    app = celery_app()
-    register(app, queue)
-    app.steps["worker"].add(Heartbeat)
-    pool = ["--pool=threads", "--concurrency=2"] if queue == CONTROL else ["--pool=prefork", f"--concurrency={settings().solve_processes}"]
     stop, worker = threading.Event(), os.getpid()
 
     logs.configure(queue)
@@ -56,6 +52,10 @@ def main() -> None:
         check_version(settings().database)
     except CirisError as error:
         parser.exit(2, f"error: {error}\n")
+    app = celery_app()
+    register(app, queue)
+    app.steps["worker"].add(Heartbeat)
+    pool = ["--pool=threads", "--concurrency=2"] if queue == CONTROL else ["--pool=prefork", f"--concurrency={settings().solve_processes}"]
     if queue == SOLVE:
         from certifier.jobs import kernels
 

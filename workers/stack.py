@@ -39,10 +39,10 @@ from typing import IO
 
 from certifier.errors import CirisError
 from certifier.orphans import die_with_parent
-from db import keys, leases, logs, migrate, workers
+from db import keys, leases, logs, migrate, unusable, workers
 from db.disk import Disk, lacks_room
 from db.session import UNAVAILABLE, Database
-from db.settings import Settings
+from db.settings import Settings, chosen
 from db.vault import kept_key
 from workers.processes import queue_server_command, queue_url
 from workers.reaper import Reaper
@@ -177,9 +177,9 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
 def _migrate(settings: Settings) -> None:
     try:
         migrate.upgrade(settings.database)
-    except UNAVAILABLE as error:
+    except unusable.ERRORS as error:
         if not lacks_room(error):
-            raise
+            raise unusable.refusal(error, settings.database) from None
         problem = f"the database in {settings.data_dir} cannot be written: the disk is full or read-only"
         raise CirisError("no_room", problem, field="--data", hint="free some room there") from None
 
@@ -393,9 +393,12 @@ def main() -> None:
     parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")
     arguments = parser.parse_args()
     logs.configure("stack")
-    chosen = Settings() if arguments.data is None else Settings(data_dir=arguments.data)
     try:
-        run_stack(chosen, port=arguments.port, ready=lambda url: print(f"ciris is up at {url}", flush=True))
+        settings = chosen(arguments.data)
+        try:
+            run_stack(settings, port=arguments.port, ready=lambda url: print(f"ciris is up at {url}", flush=True))
+        except CirisError as error:
+            raise settings.placed(error) from None
     except CirisError as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(2)

@@ -23,6 +23,7 @@ from db.transaction import writing
 from db.types import utcnow
 from workers.app import CONTROL, SOLVE, send_coordinate, send_work, waiting
 from workers.troubles import Troubles
+from workers.turns import coordinate
 
 log = logging.getLogger(__name__)
 
@@ -44,8 +45,11 @@ def do_round(holders: Holders, troubles: Troubles) -> None:
     with troubles.noting("the sweep"):
         try:
             sweep(by_time=holders.could_renew(utcnow()))
+            troubles.note(workers.REACHING_QUEUE, None)
         except OperationalError as error:
             log.warning("Redis cannot be reached; nothing was sent again: %s", error)
+            troubles.note(workers.REACHING_QUEUE, "it does not answer")
+            end_late()
         except (DBAPIError, TimeoutError):
             holders.could_not_write()
             raise
@@ -95,6 +99,14 @@ def sweep(*, by_time: bool = True) -> None:
         send_coordinate(job_id)
     if is_open and waiting(SOLVE) == 0:
         send_work()
+
+
+def end_late() -> None:
+    """Ends jobs that are to end, without a message: they wait for no worker, and their deadline does not wait for Redis."""
+    with database().read() as session:
+        ids = jobs.to_end(session, clock.now(session))
+    for job_id in ids[:ASKED]:
+        coordinate(job_id)
 
 
 def forget_gone() -> None:

@@ -22,9 +22,16 @@ class Troubles:
             yield
         except Exception as error:
             log.exception("%s failed; it is tried again", what)
-            self._failed[what] = type(error).__name__
+            self.note(what, type(error).__name__)
         else:
+            self.note(what, None)
+
+    def note(self, what: str, why: str | None) -> None:
+        """Notes why something fails; None takes the note away."""
+        if why is None:
             self._failed.pop(what, None)
+        else:
+            self._failed[what] = why
 
     def said(self) -> str | None:
         """Returns what fails and with which error, in words; None where all goes well."""

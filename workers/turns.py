@@ -24,7 +24,7 @@ from db.settings import settings
 from db.states import ACCEPT, JOB, STEP, JobState, StepState, unfinished
 from db.transaction import Afterwards, persistently, writing
 from db.types import utcnow
-from jobs.failures import IN_LOG
+from jobs.failures import IN_LOG, not_begun
 from jobs.kind import Kind, Turn
 from jobs.registry import KINDS
 from workers.app import send_coordinate, send_work
@@ -56,7 +56,7 @@ class _Rows:
             if job.state == JobState.CANCELLING:
                 _wind_up(session, kind, job, Finish(Outcome.INCONCLUSIVE, "cancelled"), afterwards)
             elif kind.is_late(session, job, now):
-                _wind_up(session, kind, job, kind.late(session, job), afterwards)
+                _wind_up(session, kind, job, _late(session, kind, job), afterwards)
             elif jobs.kills_coordinators(job, now, settings().max_attempts):
                 problem = "the coordinator died or hung each time it decided about this job"
                 job.error = CirisError("coordination_failed", problem, hint=IN_LOG).to_document()
@@ -99,6 +99,15 @@ def _save(turn: Turn, decision: Any | CirisError) -> bool:
         if job.state == JobState.QUEUED:
             jobs.start(session, job, work.served_by_now(session))
         return turn.kind.save(session, job, turn, decision, afterwards)
+
+
+def _late(session: Session, kind: Kind, job: JobRow) -> Finish:
+    """Returns the end of a job that is late. Where no worker has begun with it, that is an error."""
+    if not jobs.untouched(session, job):
+        return kind.late(session, job)
+    error = not_begun()
+    job.error = error.to_document()
+    return Finish(Outcome.ERROR, error.message)
 
 
 def _wind_up(session: Session, kind: Kind, job: JobRow, finish: Finish, afterwards: Afterwards) -> None:

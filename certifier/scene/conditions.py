@@ -189,7 +189,9 @@ def _direction(value: Any, where: str) -> tuple[float, float, float]:
 
 
 def _zone(said: Mapping[str, Any], where: str) -> tuple[tuple[float, float, float, float], ...]:
-    """Returns the faces of a box, or the half-spaces themselves."""
+    """Returns the faces of a box, or the half-spaces themselves. A list that is too long is refused before any of it is read."""
+    from certifier.conditioned import MOST_FACES
+
     if "box" in said:
         box = fields.section(said["box"], f"{where}.box", ("lower", "upper"))
         lower, upper = (_point(box.get(key), f"{where}.box.{key}") for key in ("lower", "upper"))
@@ -199,8 +201,9 @@ def _zone(said: Mapping[str, Any], where: str) -> tuple[tuple[float, float, floa
         above = [(*axis, x) for axis, x in zip(axes, upper, strict=True)]
         return (*above, *((-a, -b, -c, -x) for (a, b, c), x in zip(axes, lower, strict=True)))
     rows = said["half_spaces"]
-    if not isinstance(rows, list) or not rows:
-        raise fields.wrong(f"{where}.half_spaces", "must be a list of [a, b, c, d], each for a x + b y + c z <= d")
+    if not isinstance(rows, list) or not 1 <= len(rows) <= MOST_FACES:
+        what = f"must be a list of 1 to {MOST_FACES} half-spaces [a, b, c, d], each for a x + b y + c z <= d"
+        raise fields.wrong(f"{where}.half_spaces", what)
     found = []
     for i, row in enumerate(rows):
         place = f"{where}.half_spaces[{i}]"

@@ -48,7 +48,7 @@ def test_head_is_get_without_the_body(client: TestClient, things: dict[str, str]
     for path, methods in addresses(client, things).items():
         if "GET" not in methods or path.endswith("/stream"):
             continue
-        for query in ("", "?scene=slider", "?scene=slider&iteration=0"):
+        for query in ("", "?scene=slider", "?iteration=0"):
             whole, head = client.get(path + query), client.head(path + query)
             if whole.status_code < 400:
                 break
@@ -81,6 +81,12 @@ def test_allow_names_all_methods_of_the_address(client: TestClient, things: dict
             assert answer.status_code == 405, (method, path)
             assert set(answer.headers["allow"].split(", ")) == allowed, (method, path)
             assert method == "HEAD" or answer.headers["content-type"] == PROBLEM
+
+
+def test_allow_names_the_methods_of_files(client: TestClient) -> None:
+    for method in ("DELETE", "POST"):
+        answer = client.request(method, "/static/ciris.css")
+        assert (answer.status_code, answer.headers["allow"]) == (405, "GET, HEAD")
 
 
 UNCHANGING = {
@@ -119,10 +125,39 @@ def test_what_does_not_change_is_sent_once(client: TestClient, database: Databas
             again = client.get(first.request.url, headers={"If-None-Match": given})
             assert (again.status_code, again.content, again.headers["etag"]) == (304, b"", tag), (name, given)
             assert "content-type" not in again.headers
+            assert again.headers["vary"] == "Accept-Encoding"
         other = client.get(first.request.url, headers={"If-None-Match": '"other"'})
         assert (other.status_code, other.content) == (200, first.content)
         assert client.head(first.request.url, headers={"If-None-Match": tag}).status_code == 304
     assert {"download_region_proof", "get_region", "export_region", "get_scene", "get_scene_model", "get_scene_pairs"} <= asked
+
+
+def test_files_that_did_not_change_vary_too(client: TestClient) -> None:
+    tag = client.get("/static/ciris.css").headers["etag"]
+    again = client.get("/static/ciris.css", headers={"If-None-Match": tag})
+    assert (again.status_code, again.headers["vary"]) == (304, "Accept-Encoding")
+
+
+@pytest.mark.parametrize(
+    ("accepted", "compressed"),
+    [
+        ("gzip", True),
+        ("gzip;q=0", False),
+        ("gzip;q=0.0, deflate", False),
+        ("br, GZIP; q=0.5", True),
+        ("*", True),
+        ("*;q=0", False),
+        ("gzip;q=0, *", False),
+        ("identity", False),
+        ("notgzip", False),
+        ("gzip;q=much", False),
+        ("", False),
+    ],
+)
+def test_only_those_who_take_gzip_get_it(client: TestClient, accepted: str, compressed: bool) -> None:
+    answer = client.get("/openapi.json", headers={"Accept-Encoding": accepted})
+    assert ("content-encoding" in answer.headers, answer.headers["vary"]) == (compressed, "Accept-Encoding")
+    assert answer.json()["openapi"]
 
 
 def test_what_is_named_anew_has_another_tag(client: TestClient, things: dict[str, str]) -> None:

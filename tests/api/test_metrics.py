@@ -10,12 +10,13 @@ from fastapi.testclient import TestClient
 
 from api.metrics import BUCKETS, Requests, render
 from certifier.model import Scene
+from db import jobs, steps, work
 from db.models import IterationRow
 from db.session import Database
 from db.statistics import collect
 from db.types import utcnow
 from tests.api.test_jobs import GROW
-from tests.db.builders import a_running_job
+from tests.db.builders import a_job, a_running_job
 
 SAMPLE = re.compile(r'([a-z_]+)(?:\{((?:[a-z]+="[^"\\]*",?)*)\})? (-?[0-9.e+-]+)')
 
@@ -123,6 +124,26 @@ def test_latencies_are_counted_in_buckets_and_streams_are_not(tmp_path: Path) ->
     assert "POST" not in first.latencies()
     again = Requests(tmp_path / "requests" / "api")
     assert again.latencies() == second.latencies()
+
+
+def test_jobs_that_wait_for_a_solver_are_counted(db: Database) -> None:
+    """Those with pairs, and those with a step, which no iteration has begun for."""
+    with db.write() as session:
+        begun, seeding, _new = a_running_job(session, pair_count=1), a_job(session), a_job(session)
+        jobs.start(session, seeding)
+        steps.add(session, seeding, "propose", {})
+
+    def waiting() -> float:
+        with db.read() as session:
+            return samples(render((0.0, collect(session)), {}, Requests(), {}, {}))["ciris_jobs_without_solver"]
+
+    assert waiting() == 2
+    with db.write() as session:
+        work.claim(session, begun.id, lease_seconds=60, batch_seconds=0.5)
+    assert waiting() == 1
+    with db.write() as session:
+        work.claim(session, seeding.id, lease_seconds=60, batch_seconds=0.5)
+    assert waiting() == 0
 
 
 def test_the_age_of_what_waits_is_told(db: Database) -> None:

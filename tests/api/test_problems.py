@@ -1,14 +1,19 @@
 """Every error is problem+json, and other web sites are kept out."""
 
+import re
+from http import HTTPStatus
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
+from starlette.exceptions import HTTPException
 
+from api import problems
 from api.app import create_app
 from db import jobs
 from db.session import Database
 from tests.api.conftest import BASE_URL, PROBLEM
+from tests.docs.errors import PAGE
 
 
 @pytest.mark.parametrize(
@@ -30,6 +35,48 @@ def test_errors_of_the_framework_are_problems_too(client: TestClient, method: st
 def test_a_body_that_is_not_json_is_a_bad_request(client: TestClient) -> None:
     answer = client.post("/v1/jobs", content="{", headers={"Content-Type": "application/json"})
     assert (answer.status_code, answer.json()["code"]) == (400, "malformed_json")
+
+
+@pytest.mark.parametrize("headers", [{"Content-Type": "text/plain"}, {"Content-Type": "application/x-www-form-urlencoded"}, {}])
+def test_a_body_that_is_not_said_to_be_json_is_refused_for_that(client: TestClient, headers: dict[str, str]) -> None:
+    problem = client.post("/v1/jobs", content=b'{"kind": "grow"}', headers=headers).json()
+    said = problem["status"], problem["code"], problem["field"], problem["detail"], problem["hint"]
+    hint = "send `Content-Type: application/json`"
+    assert said == (422, "invalid_request", "Content-Type", "the body is not said to be JSON", hint)
+
+
+def test_every_code_that_the_service_answers_is_described(client: TestClient) -> None:
+    """Those that the OpenAPI document names, those that have a status, and those of any status of the framework."""
+    paths = client.get("/openapi.json").json()["paths"].values()
+    answers = [answer for path in paths for operation in path.values() for answer in operation["responses"].values()]
+    said = [answer["description"] for answer in answers if PROBLEM in answer.get("content", {})]
+    named = {code for text in said for code in re.findall(r"`(\w+)`", text)}
+    framework = {problems._http(HTTPException(status)).code for status in HTTPStatus if status >= HTTPStatus.BAD_REQUEST}
+    assert framework == {"bad_request", "internal", "method_not_allowed", "not_found", "too_large"}
+    assert {"scene_not_found", "invalid_request"} <= named
+    described = set(re.findall(r"^\| `(\w+)` \|", PAGE.read_text(), re.MULTILINE))
+    assert named | framework | set(problems._STATUS_OF_CODE) <= described
+
+
+def test_a_parameter_that_a_route_does_not_have_is_refused(client: TestClient) -> None:
+    problem = client.get("/v1/jobs?scnee=slider").json()
+    assert (problem["status"], problem["code"], problem["field"]) == (422, "invalid_request", "scnee")
+    assert problem["detail"] == "there is no parameter 'scnee' here"
+    assert "scene" in problem["hint"]
+
+
+def test_no_route_of_the_interface_takes_an_unknown_parameter(client: TestClient) -> None:
+    asked = 0
+    for path, operations in client.get("/openapi.json").json()["paths"].items():
+        for method in operations:
+            answer = client.request(method, re.sub(r"\{\w+\}", "1", path), params={"misspelt": "1"}, json={} if method == "post" else None)
+            if not path.startswith("/v1/"):
+                assert answer.status_code in (200, 503), path
+                continue
+            problem = answer.json()
+            assert (answer.status_code, problem["field"]) == (422, "misspelt"), (method, path)
+            asked += 1
+    assert asked > 50
 
 
 def test_every_wrong_field_is_listed(client: TestClient) -> None:

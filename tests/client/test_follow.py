@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator
+from threading import Event
+from typing import Any, cast
 
+import pytest
+
+from ciris.synchronous.client import Client
+from client import follow as following
 from client.follow import Teller
 from client.output import Screen
 
@@ -75,3 +81,35 @@ def test_watching_tells_of_every_pair() -> None:
     assert "  2/2 a - c: not certifiable (0.25 s)" in paper.lines
     assert paper.last == "iteration 1: 1 of 1 pairs settled, a - c: certified"
     assert paper.part == 1.0
+
+
+class Silent:
+    """A client of a service that says nothing of a job until its status was asked for a few times."""
+
+    def __init__(self, *status: str) -> None:
+        self._left, self._asked = list(status), Event()
+
+    def job_pairs(self, _job: str, iteration: int) -> dict[str, Any]:
+        return {"pairs": []}
+
+    def job(self, _job: str) -> dict[str, Any]:
+        status = self._left.pop(0) if len(self._left) > 1 else self._left[0]
+        if len(self._left) == 1:
+            self._asked.set()
+        return {"status": status}
+
+    def events(self, _job: str) -> Iterator[dict[str, Any]]:
+        assert self._asked.wait(10)
+        yield {"kind": "job", "data": {"state": "running"}}
+
+
+def test_what_a_silent_job_waits_for_is_in_the_status_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(following, "SILENT_S", 0.0)
+    monkeypatch.setattr(following, "LOOK_S", 0.01)
+    said: list[str] = []
+    paper = Paper()
+    monkeypatch.setattr(paper, "status", lambda text, part=None: said.append(text))
+    following.follow(
+        cast(Client, Silent("queued: no worker", "working", "queued: the queue does not answer", "working")), "j", paper, False
+    )
+    assert said == ["job queued: no worker", "job queued: the queue does not answer", "job running"]

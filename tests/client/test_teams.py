@@ -104,3 +104,22 @@ def test_the_command_passes_limits_on(tmp_path: Path) -> None:
         subprocess.run(command("project", *words, "--data", tmp_path), env=surroundings(), check=True)
     listed = subprocess.run(command("project", "ls", "--json", "--data", tmp_path), env=surroundings(), check=True, capture_output=True)
     assert [row["keep_days"] for row in json.loads(listed.stdout)] == [None, 7.0]
+
+
+def test_keys_are_those_of_a_database_that_is_named(tmp_path: Path) -> None:
+    """CIRIS_URL alone names a service, not a database; an empty list says of which database it is."""
+
+    def key(*words: str, **variables: str) -> subprocess.CompletedProcess[str]:
+        environment = surroundings(XDG_DATA_HOME=str(tmp_path), **variables)
+        return subprocess.run(command("key", *words), env=environment, capture_output=True, text=True, check=False)
+
+    data = tmp_path / "ciris"
+    migrate.upgrade(f"sqlite:///{data / 'ciris.sqlite3'}")
+    for words in (("ls",), ("revoke", "planner"), ("add", "planner", "--scope", "read")):
+        done = key(*words, CIRIS_URL="https://ciris.example.org")
+        assert (done.returncode, done.stdout) == (2, "")
+        assert done.stderr.startswith("error: CIRIS_URL: this command does not take its service from it (add --url URL")
+    listed = key("ls")
+    assert (listed.returncode, listed.stdout, listed.stderr) == (0, "", f"database: {data / 'ciris.sqlite3'}\n")
+    told = key("ls", "--data", str(data), CIRIS_URL="https://ciris.example.org")
+    assert (told.returncode, told.stderr) == (0, listed.stderr)

@@ -47,6 +47,18 @@ def test_a_job_without_a_solver_does_not_run(db: Database) -> None:
         assert does(session, begun) == ["queued: no worker"], "one that ends takes none"
 
 
+def test_a_job_that_has_not_begun_does_not_come_next_where_nobody_would_work_on_it(db: Database) -> None:
+    with db.write() as session:
+        crew(session, CONTROL)
+        new = a_job(session)
+        assert does(session, new) == ["queued: no worker"]
+        crew(session, SOLVER, state=WorkerState.PAUSED)
+        assert does(session, new) == ["queued: all workers paused"]
+        workers.leave(session, SOLVER.process)
+        crew(session, SOLVER)
+        assert does(session, new) == ["queued: next"]
+
+
 def test_a_worker_that_is_silent_for_a_minute_is_none(db: Database) -> None:
     with db.write() as session:
         crew(session, SOLVER, CONTROL)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
 from collections.abc import Callable
 from contextlib import closing
@@ -12,9 +13,11 @@ import pytest
 from sqlalchemy import select, text
 
 from certifier.errors import CirisError
-from db import backup, jobs, migrate, proofs, version
+from db import backup, jobs, leases, migrate, proofs, version, workers
 from db.models import EventRow, JobRow, ProofRow
 from db.session import Database
+from db.states import WorkerState
+from db.workers import Made, WorkerKind
 from tests.db.builders import a_job, a_running_job, add_region
 from tests.services import Postgres
 
@@ -93,6 +96,47 @@ def test_a_backup_of_before_an_upgrade_is_restored_and_upgraded(filled: str, oth
     database.close()
 
 
+def test_a_backup_of_an_older_version_has_no_digest_and_is_restored(filled: str, other_url: str, tmp_path: Path) -> None:
+    file, again = tmp_path / "file", tmp_path / "again"
+    backup.backup(filled, file)
+    assert backup.sealed(file)
+    _as_of_an_older_version(file)
+    assert not backup.sealed(file)
+    backup.restore(other_url, file)
+    backup.backup(other_url, again)
+    assert rows(file) == rows(again)
+
+
+def test_workers_of_the_other_database_are_none_of_the_restored_one(filled: str, other_url: str, tmp_path: Path) -> None:
+    database = Database(filled)
+    with database.write() as session:
+        made = Made(leases.name_of(os.getpid()), WorkerKind.SOLVE, "1", 1, 1, 1)
+        workers.tell(session, made, WorkerState.RUNNING)
+    database.close()
+    backup.backup(filled, tmp_path / "file")
+    backup.restore(other_url, tmp_path / "file")
+    assert migrate.downgrade(other_url, "base") == NEWEST
+
+
+def test_what_has_no_tables_any_more_is_restored_into(filled: str, other_url: str, tmp_path: Path) -> None:
+    file, again = tmp_path / "file", tmp_path / "again"
+    backup.backup(filled, file)
+    migrate.upgrade(other_url)
+    migrate.downgrade(other_url, "base")
+    backup.restore(other_url, file)
+    backup.backup(other_url, again)
+    assert rows(file) == rows(again)
+
+
+def test_a_file_that_is_no_database_is_not_replaced(sqlite_url: str, tmp_path: Path) -> None:
+    file, place = tmp_path / "file", tmp_path / "photos"
+    backup.backup(sqlite_url, file)
+    place.write_bytes(b"photos" * 100)
+    with pytest.raises(CirisError, match="photos is not empty"):
+        backup.restore(f"sqlite:///{place}", file)
+    assert place.read_bytes() == b"photos" * 100
+
+
 def test_a_backup_is_for_its_user_alone_and_takes_no_other_files_place(filled: str, tmp_path: Path) -> None:
     file = tmp_path / "file"
     backup.backup(filled, file)
@@ -123,8 +167,17 @@ def test_a_log_without_its_database_is_not_empty(sqlite_url: str, tmp_path: Path
     assert not place.exists()
 
 
+def _as_of_an_older_version(path: Path) -> None:
+    """Takes the digest of a backup away, and the sign that it has one."""
+    os.truncate(path, path.stat().st_size - backup._SEAL_BYTES)
+    with closing(sqlite3.connect(path)) as file:
+        file.execute("PRAGMA application_id=0")
+
+
 def _change(statement: str, *values: object) -> Callable[[Path], None]:
     def change(path: Path) -> None:
+        if backup.sealed(path):
+            _as_of_an_older_version(path)
         with closing(sqlite3.connect(path)) as file:
             file.execute(statement, values)
             file.commit()
@@ -132,14 +185,43 @@ def _change(statement: str, *values: object) -> Callable[[Path], None]:
     return change
 
 
-def _cut(path: Path) -> None:
-    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+def _cut(left: float) -> Callable[[Path], None]:
+    return lambda path: os.truncate(path, int(path.stat().st_size * left))
+
+
+def _cut_by(count: int) -> Callable[[Path], None]:
+    return lambda path: os.truncate(path, path.stat().st_size - count)
+
+
+def _flip(place: float) -> Callable[[Path], None]:
+    def flip(path: Path) -> None:
+        content = bytearray(path.read_bytes())
+        content[int(place * (len(content) - 1))] ^= 1
+        path.write_bytes(content)
+
+    return flip
+
+
+def _half_of_an_old_file(path: Path) -> None:
+    _as_of_an_older_version(path)
+    _cut(0.5)(path)
+
+
+DOCUMENT = "UPDATE scenes SET document = replace(document, '\"padding\"', '\"paddinG\"')"
 
 
 DAMAGES: dict[str, tuple[Callable[[Path], Any], str, str]] = {
     "a proof that has changed": (_change("UPDATE proofs SET data = ?", b"another"), "damaged_backup", "the proof .* has changed"),
     "a row that is missing": (_change("DELETE FROM scenes"), "damaged_backup", "refers to a row of scenes that is missing"),
-    "half a file": (_cut, "damaged_backup", "is not whole"),
+    "a scene that has changed": (_change(DOCUMENT), "damaged_backup", "the scene .* has changed"),
+    "a scene that is no document": (_change("UPDATE scenes SET document = '[1'"), "damaged_backup", "the scene .* has changed"),
+    "half a file": (_cut(0.5), "damaged_backup", "its end is missing"),
+    "half a file of an older version": (_half_of_an_old_file, "damaged_backup", "is not whole"),
+    "a file without its last byte": (_cut_by(1), "damaged_backup", "its end is missing"),
+    "a file without its digest": (_cut_by(backup._SEAL_BYTES), "damaged_backup", "its end is missing"),
+    "a file with something behind it": (lambda path: path.open("a").write("x"), "damaged_backup", "its end is missing"),
+    "a flipped bit of the digest": (_flip(1.0), "damaged_backup", "another digest"),
+    **{f"a flipped bit at {i}/16": (_flip(i / 16.01), "damaged_backup", "another digest") for i in range(16)},
     "another file": (lambda path: path.write_bytes(b"no database at all" * 100), "damaged_backup", "is not whole"),
     "no file": (lambda path: path.unlink(), "not_a_backup", "no such file"),
     "an empty file": (lambda path: path.write_bytes(b""), "not_a_backup", "has no tables"),

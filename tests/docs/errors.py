@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from functools import cache
-from http import HTTPStatus
 from pathlib import Path
 
-from api.problems import status_of
+from api.problems import OF_THE_FRAMEWORK, status_of
 from tests.errors.sites import sites
 
 PAGE = Path(__file__).parents[2] / "docs" / "errors.md"
@@ -27,10 +26,9 @@ ROOMS = {
     "certifier": "the certifier",
 }
 GIVEN = {
-    "method_not_allowed": "api",
+    **dict.fromkeys(("bad_request", "internal", *OF_THE_FRAMEWORK.values()), "api"),
     "missing_option": "certifier/seeding",
     "motion_not_finite": "certifier/motion",
-    "not_found": "api",
     "number_too_large": "certifier",
 }
 """Maps codes that are not written where the error is made to the part of the program."""
@@ -74,7 +72,7 @@ def page() -> str:
 def _status(code: str) -> str:
     if set(codes()[code]) <= NOT_HTTP:
         return ""
-    return str({"not_found": HTTPStatus.NOT_FOUND, "method_not_allowed": HTTPStatus.METHOD_NOT_ALLOWED}.get(code, status_of(code)).value)
+    return str(status_of(code).value)
 
 
 if __name__ == "__main__":

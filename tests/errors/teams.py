@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import sqlite3
+from contextlib import closing
 from typing import Any
 
 import pytest
 from sqlalchemy import update
 
-from db import command_line, jobs, keys, projects, retention
+from db import command_line, jobs, keys, migrate, projects, retention
 from db.disk import Disk
 from db.keys import Scope
 from db.models import JobRow
+from db.session import Database
 from db.settings import settings
 from db.vault import Vault, kept_key
 from tests.db.builders import a_running_job, add_region
@@ -71,6 +74,26 @@ def by_a_few_characters(t: Trial) -> None:
         retention.delete_job(session, a_running_job(session).id[:8], dependents=True)
 
 
+def without_a_database(t: Trial) -> None:
+    t.need("ciris")
+    t.need("monkeypatch").delenv("CIRIS_DATA_DIR")
+    t.ciris("key", "ls", CIRIS_URL="http://127.0.0.1:9")
+
+
+def with_settings(t: Trial, **variables: str) -> None:
+    """Reads the settings as the commands about the database do, with a data directory."""
+    patch: pytest.MonkeyPatch = t.need("monkeypatch")
+    for name, value in variables.items():
+        patch.setenv(name, value)
+    command_line.settings_with(t.directory)
+
+
+def in_another_programs_database(t: Trial) -> None:
+    with closing(sqlite3.connect(t.directory / "photos.sqlite3")) as file:
+        file.execute("CREATE TABLE photos (name)")
+    migrate.upgrade(f"sqlite:///{t.directory}/photos.sqlite3")
+
+
 def one_key_too_many(t: Trial) -> None:
     t.need("environment").setenv("CIRIS_MAX_KEYS_PER_PROJECT", "1")
     settings.cache_clear()
@@ -99,5 +122,13 @@ TEAMS: Table = {
     ("too_many_keys", "name"): [one_key_too_many],
     ("first_key", "name"): [lambda t: t.ask("POST", "/v1/keys", json={"name": "mine", "scope": "admin"})],
     ("bad_option", "--label"): [lambda t: t.ciris("job", "ls", "--label", "team")],
-    ("bad_option", "--data"): [lambda t: t.ciris("key", "ls", "--url", "http://127.0.0.1:9", "--data", "here")],
+    ("option", "CIRIS_URL"): [without_a_database],
+    ("setting", "CIRIS_PORT"): [lambda t: with_settings(t, CIRIS_PORT="many")],
+    ("setting", "CIRIS_DATABASE_URL"): [lambda t: with_settings(t, CIRIS_DATABASE_URL="mysql://127.0.0.1/ciris")],
+    ("data_directory", "CIRIS_DATABASE_URL"): [lambda t: Database(f"sqlite:///{t.write(file='')}/ciris.sqlite3")],
+    ("not_empty", "CIRIS_DATABASE_URL"): [in_another_programs_database],
+    ("bad_option", "--data"): [
+        lambda t: with_settings(t, CIRIS_DATABASE_URL=f"sqlite:///{t.directory}/one.sqlite3"),
+        lambda t: t.ciris("key", "ls", "--url", "http://127.0.0.1:9", "--data", "here"),
+    ],
 }

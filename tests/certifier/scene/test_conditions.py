@@ -97,6 +97,7 @@ def test_all_kinds_are_read(tmp_path: Path) -> None:
         ("inside: {what: [cup/cup], box: {lower: [0, 0, 0], upper: [1, 0, 1]}}", "scene_field", "inside.box", "interior"),
         ("inside: {what: [cup/cup], box: {lower: [0, 0], upper: [1, 1, 1]}}", "scene_field", "inside.box.lower", "point"),
         ("inside: {what: [cup/cup], half_spaces: []}", "scene_field", "inside.half_spaces", "list"),
+        (f"inside: {{what: [cup/cup], half_spaces: [{'x, ' * 101}]}}", "scene_field", "inside.half_spaces", "list of 1 to 100 half-spaces"),
         ("inside: {what: [cup/cup], half_spaces: [[1, 0, 0]]}", "scene_field", "inside.half_spaces[0]", "four"),
         ("inside: {what: [cup/cup], half_spaces: [[0, 0, 0, 1]]}", "scene_field", "inside.half_spaces[0]", "longer"),
         (
