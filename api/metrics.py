@@ -6,6 +6,7 @@ They count the rows of the database, the messages in the queues and the requests
 from __future__ import annotations
 
 import logging
+import math
 import mmap
 from bisect import bisect_left
 from collections.abc import Iterable, Mapping
@@ -26,6 +27,8 @@ _LATENCIES = 2 * len(METHODS) * len(STATUSES)
 _LATENCY_CELLS = len(BUCKETS) + 2
 """For each method: a count for each bucket, one for what is beyond them, and the sum."""
 _BYTES = 8 * (_LATENCIES + len(METHODS) * _LATENCY_CELLS)
+QUANTILES = (0.5, 0.9, 0.99)
+"""Times of jobs are told for these parts of them."""
 AGES = (0, 1, 10, 60, 600, 3600)
 """Waiting work is counted by these least ages, in seconds."""
 MEDIA_TYPE = "text/plain; version=0.0.4"
@@ -152,6 +155,13 @@ def _of_rows(age: float, statistics: Statistics) -> list[str]:
         _family("ciris_statistics_age_seconds", "gauge", "Time since the rows of the database were counted.", {(): age}),
         _family("ciris_jobs", "gauge", "Jobs by state.", _by("state", statistics.jobs)),
         _family("ciris_jobs_ended", "gauge", "Stored jobs that have ended, by project and how.", _ended(statistics)),
+        _family(
+            "ciris_job_wait_seconds",
+            "gauge",
+            "Time until a solver began a job, for those of the last 15 minutes.",
+            _quantiles(statistics.waited),
+        ),
+        _family("ciris_job_seconds", "gauge", "Time until a job ended, for those of the last 15 minutes.", _quantiles(statistics.took)),
         _family("ciris_pairs", "gauge", "Pairs by state; the settled ones by outcome.", _by("state", statistics.pairs)),
         _family("ciris_pair_seconds", "gauge", "Time spent on the stored pairs, by state.", _by("state", statistics.pair_seconds)),
         _family("ciris_step_seconds", "gauge", "Time spent on the stored steps, by kind.", _by("kind", statistics.step_seconds)),
@@ -169,6 +179,15 @@ def _of_rows(age: float, statistics: Statistics) -> list[str]:
 
 def _ended(statistics: Statistics) -> Samples:
     return {(("project", project), ("end", end)): count for (project, end), count in statistics.ended.items()}
+
+
+def _quantiles(seconds: Mapping[str, list[float]]) -> Samples:
+    """Returns the least time within which each of these parts of a project's jobs is."""
+    return {
+        (("project", project), ("quantile", f"{part:g}")): ordered[math.ceil(part * len(ordered)) - 1]
+        for project, ordered in seconds.items()
+        for part in QUANTILES
+    }
 
 
 def _ages(statistics: Statistics) -> Samples:

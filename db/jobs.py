@@ -276,6 +276,12 @@ def start(session: Session, job: JobRow, served: float = 0.0) -> None:
         events.emit(session, job, "job", {"state": JobState.RUNNING})
 
 
+def claimed(job: JobRow) -> None:
+    """Notes when a solver first works on the job. The caller holds the job's lock."""
+    if job.claimed_at is None:
+        job.claimed_at = utcnow()
+
+
 def charge(session: Session, job: JobRow, seconds: float) -> None:
     """Counts seconds of work as done for the job, divided by the job's share of its project.
 

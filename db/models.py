@@ -224,6 +224,8 @@ class JobRow(Owned, Base):
     """How many processes died over the next transition while those that had forked them lived."""
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
     started_at: Mapped[datetime | None]
+    claimed_at: Mapped[datetime | None]
+    """When a solver first began to work on it."""
     finished_at: Mapped[datetime | None]
     deadline_at: Mapped[datetime | None]
     bytes: Mapped[int] = mapped_column(BigInteger, default=0)

@@ -149,6 +149,7 @@ def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds:
     pairs = tuple(Claimed(row.pair_index, row.part, row.attempts + 1, row.deaths) for row in chosen)
     jobs.charge(session, job, sum(row.forecast_seconds for row in chosen))
     token = leases.take(session, PairRow, [row.id for row in chosen], seconds=lease_seconds)
+    jobs.claimed(job)
     job.open_pairs -= len(chosen)
     job.running_pairs += len(chosen)
     if fresh:

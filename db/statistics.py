@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from enum import StrEnum
 
 from sqlalchemy import func, select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from certifier.outcome import DEADLINE
 from db import clock, jobs, work, workers
@@ -45,6 +47,9 @@ FAULTS = frozenset(
 PROJECTS, OTHER = 50, "(others)"
 """This many projects are counted by themselves, the oldest ones. The others are counted together, so that their number is no burden."""
 
+RECENT, MOST = timedelta(minutes=15), 10_000
+"""Times of jobs are those of the last RECENT, of MOST jobs at most."""
+
 
 @dataclass(frozen=True)
 class Statistics:
@@ -52,6 +57,8 @@ class Statistics:
 
     Attributes:
         ended: (project, how they ended) -> stored jobs. At most ``PROJECTS`` projects have a name of their own here.
+        waited: project -> the seconds from submission until a solver began, of jobs that it began in the last RECENT, in order.
+        took: project -> the seconds from submission to the end, of jobs that ended in the last RECENT, in order.
         pair_seconds: seconds spent on pairs, summed by the state that resulted.
         step_seconds: seconds spent on steps, summed by kind.
         decisions_due: jobs for which a decision of a control worker is due that nobody makes.
@@ -64,6 +71,8 @@ class Statistics:
 
     jobs: dict[str, int]
     ended: dict[tuple[str, End], int]
+    waited: dict[str, list[float]]
+    took: dict[str, list[float]]
     pairs: dict[str, int]
     pair_seconds: dict[str, float]
     step_seconds: dict[str, float]
@@ -95,6 +104,8 @@ def collect(session: Session) -> Statistics:
     return Statistics(
         jobs={state: states.get(state, 0) for state in JobState},
         ended=_ended(session),
+        waited=_seconds(session, JobRow.claimed_at, now),
+        took=_seconds(session, JobRow.finished_at, now),
         pairs={state: counted.get(state, 0) for state in PairState},
         pair_seconds={state: seconds.get(state) or 0.0 for state in PairState},
         step_seconds={kind: total or 0.0 for kind, total in sorted(({ACCEPT: 0.0} | steps).items())},
@@ -109,8 +120,24 @@ def collect(session: Session) -> Statistics:
     )
 
 
+def _seconds(session: Session, until: InstrumentedAttribute[datetime | None], now: datetime) -> dict[str, list[float]]:
+    """Returns project -> the seconds from submission until a time that was lately, in order."""
+    oldest = _oldest(session)
+    found: dict[str, list[float]] = {}
+    recent = select(JobRow.project, JobRow.created_at, until).where(until >= now - RECENT).order_by(until.desc()).limit(MOST)
+    for project, begin, end in session.execute(recent):
+        assert end is not None
+        found.setdefault(project if project in oldest else OTHER, []).append(max((end - begin).total_seconds(), 0.0))
+    return {project: sorted(seconds) for project, seconds in sorted(found.items())}
+
+
+def _oldest(session: Session) -> Sequence[str]:
+    """Returns the projects that are counted by themselves."""
+    return session.scalars(select(ProjectRow.name).order_by(ProjectRow.created_at, ProjectRow.name).limit(PROJECTS)).all()
+
+
 def _ended(session: Session) -> dict[tuple[str, End], int]:
-    oldest = session.scalars(select(ProjectRow.name).order_by(ProjectRow.created_at, ProjectRow.name).limit(PROJECTS)).all()
+    oldest = _oldest(session)
     counts = Counter({(project, end): 0 for project in oldest for end in End})
     columns = (JobRow.project, JobRow.state, JobRow.reason.startswith(DEADLINE), JobRow.error["code"].as_string())
     ended = select(*columns, func.count()).where(JobRow.state.not_in(unfinished(JOB))).group_by(*columns)

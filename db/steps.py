@@ -58,6 +58,7 @@ def claim(session: Session, job: JobRow, *, accepts: bool, lease_seconds: float,
         return None
     attempt, deaths = step.attempts + 1, step.deaths
     token = leases.take(session, StepRow, [step.id], seconds=lease_seconds)
+    jobs.claimed(job)
     return Claim(token, step.id, job.id, job.scene_id, job.traceparent, job.kind, step.kind, step.input, attempt, deaths)
 
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from datetime import timedelta
 from typing import Any
 
 import pytest
 
 from certifier.outcome import DEADLINE, Outcome
-from db import jobs, projects, scenes, statistics
+from db import jobs, pairs, projects, scenes, statistics
 from db.session import Database
 from db.states import JobState
 from db.statistics import OTHER, End, collect
-from tests.db.builders import a_job
+from db.types import utcnow
+from tests.db.builders import a_job, a_running_job
 from tests.scenes import slider
 
 
@@ -53,3 +55,30 @@ def test_only_so_many_projects_are_named(db: Database, monkeypatch: pytest.Monke
         ended = collect(session).ended
     assert {project for project, _ in ended} == {"default", "second", OTHER}
     assert (ended["second", End.CANCELLED], ended[OTHER, End.CANCELLED]) == (1, 2)
+
+
+def test_times_of_jobs_are_those_of_lately(db: Database) -> None:
+    """From submission until a solver began, and until the end; by project, in order."""
+    now = utcnow()
+    with db.write() as session:
+        for seconds, ago in ((4, 10), (2, 60), (7, 1000)):  # the last one ended more than a quarter of an hour ago
+            job = a_job(session)
+            job.created_at = now - timedelta(seconds=ago + 2 * seconds)
+            job.claimed_at, job.finished_at = now - timedelta(seconds=ago + seconds), now - timedelta(seconds=ago)
+        a_job(session)
+    with db.read() as session:
+        found = collect(session)
+    assert found.waited == {"default": [pytest.approx(2), pytest.approx(4)]}
+    assert found.took == {"default": [pytest.approx(4), pytest.approx(8)]}
+
+
+def test_a_job_knows_when_a_solver_first_worked_on_it(db: Database) -> None:
+    with db.write() as session:
+        job = a_running_job(session, pair_count=2)
+        assert job.claimed_at is None
+        first = pairs.claim(session, job, lease_seconds=60, batch_seconds=1e-9)
+        assert first is not None
+        begun = job.claimed_at
+        assert begun is not None
+        pairs.claim(session, job, lease_seconds=60, batch_seconds=1e-9)
+        assert job.claimed_at == begun

@@ -187,6 +187,7 @@ def test_the_map_is_the_same_when_a_process_is_killed(client: TestClient, arm: t
 
 
 def test_the_deadline_leaves_what_is_proved(client: TestClient, arm: tuple[Scene, np.ndarray]) -> None:
+    eventually(lambda: "solve" in [worker["kind"] for worker in client.get("/v1/workers").json()["workers"]], "a solver is ready", 120)
     job = ended(asked(client, arm[0], deadline_seconds=5.0), seconds=60)
     assert (job.state, job.outcome, job.reason) == ("succeeded", "inconclusive", "the deadline was reached")
     assert stored_after(client, job)["coverage"]["value"] > 0

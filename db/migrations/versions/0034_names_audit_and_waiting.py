@@ -1,4 +1,4 @@
-"""The named configurations of a scene belong to its names, and not to its content; old lines of the audit log are found quickly
+"""The named configurations of a scene belong to its names, and not to its content; jobs say when a solver began
 
 Revision: 0034, follows 0033.
 """
@@ -26,6 +26,7 @@ def _document(scene_id: str) -> dict[str, Any]:
 
 def upgrade() -> None:
     op.create_index("ix_audit_created_at", "audit", ["created_at"])
+    op.add_column("jobs", sa.Column("claimed_at", sa.DateTime(timezone=True), nullable=True))
     op.add_column("scene_names", sa.Column("configurations", sa.JSON, nullable=False, server_default="{}"))
     database = op.get_bind()
     for scene_id in database.scalars(sa.select(_SCENES.c.id)).all():
@@ -44,4 +45,5 @@ def downgrade() -> None:
             whole = {**document, "configurations": both}
             database.execute(sa.update(_SCENES).where(_SCENES.c.id == scene_id).values(document=whole))
     op.drop_column("scene_names", "configurations")
+    op.drop_column("jobs", "claimed_at")
     op.drop_index("ix_audit_created_at", "audit")
