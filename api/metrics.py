@@ -28,7 +28,7 @@ _LATENCY_CELLS = len(BUCKETS) + 2
 """For each method: a count for each bucket, one for what is beyond them, and the sum."""
 _BYTES = 8 * (_LATENCIES + len(METHODS) * _LATENCY_CELLS)
 QUANTILES = (0.5, 0.9, 0.99)
-"""Times of jobs are told for these parts of them."""
+"""The metrics have the times within which these parts of the jobs are."""
 AGES = (0, 1, 10, 60, 600, 3600)
 """Waiting work is counted by these least ages, in seconds."""
 MEDIA_TYPE = "text/plain; version=0.0.4"

@@ -9,6 +9,8 @@ from typing import Any
 
 import yaml
 
+from certifier.scene.nodes import Loader
+
 LARGEST = 2**28
 """No file of numbers is read that has more bytes than this."""
 UNREADABLE = (OSError, ValueError, TypeError, EOFError, yaml.YAMLError, RecursionError)
@@ -42,7 +44,7 @@ def document_of(path: str | Path) -> dict[str, Any]:
         OSError: it cannot be read.
     """
     text = text_of(path)
-    document: Any = json.loads(text) if str(path).lower().endswith(".json") else yaml.safe_load(text)
+    document: Any = json.loads(text) if str(path).lower().endswith(".json") else yaml.load(text, Loader)
     if not isinstance(document, dict):
         raise NotNumbers("it must be a mapping, such as q: [[0, 0.3], [0.5, 0.2]]")
     return document

@@ -20,7 +20,7 @@ COMMAND_LINE = "command line"
 """The name of a person in a shell with access to the database is not known."""
 
 KEPT_DAYS = 400
-"""A line stays for so many days: a year, and some days to look back at it."""
+"""A line stays for this many days: a year, and some days to look back at it."""
 TOGETHER = 1000
 """At most this many lines are forgotten in one transaction."""
 

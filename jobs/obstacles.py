@@ -11,7 +11,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from certifier import stored
-from certifier.conditions import called, fails
+from certifier.conditions import called, condition_named, fails
 from certifier.growth import obstacles as growth
 from certifier.model import Pair, Scene
 from certifier.outcome import Outcome
@@ -113,7 +113,8 @@ def _what_was_cut(pair: Pair, cut: growth.Obstacle, *, where: bool) -> list[str]
     if where and cut.contact:
         sentences.append(f"{fails(pair.a, pair.b)} at the configuration named, as floating point says.")
     elif where:
-        sentences.append(f"{called(pair.a, pair.b)} could not be proved near the configuration named.")
+        apart = "" if condition_named(pair.a, pair.b) else " apart"
+        sentences.append(f"{called(pair.a, pair.b)} could not be proved{apart} near the configuration named.")
     if cut.faces is None or cut.lost is None:
         return [*sentences, f"Something was cut off for {called(pair.a, pair.b)} {_times(cut.times)}."]
     faces = "1 face was" if cut.faces == 1 else f"{cut.faces} faces were"

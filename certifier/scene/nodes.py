@@ -17,12 +17,12 @@ _BREAKS = re.compile("\r(?!\n)|[\x85\u2028\u2029]")
 _LINES = re.compile("\r\n|[\r\n\x85\u2028\u2029]")
 
 
-class _Loader(yaml.SafeLoader):
+class Loader(yaml.SafeLoader):
     """This is YAML's safe loader, which here also reads ``1e-3`` as a number."""
 
 
-_Loader.yaml_implicit_resolvers = {k: list(v) for k, v in yaml.SafeLoader.yaml_implicit_resolvers.items()}
-_Loader.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(r"^[-+]?[0-9][0-9]*(\.[0-9]*)?[eE][-+]?[0-9]+$"), list("-+0123456789"))
+Loader.yaml_implicit_resolvers = {k: list(v) for k, v in yaml.SafeLoader.yaml_implicit_resolvers.items()}
+Loader.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(r"^[-+]?[0-9][0-9]*(\.[0-9]*)?[eE][-+]?[0-9]+$"), list("-+0123456789"))
 
 
 def decoded(data: bytes, name: str) -> str:
@@ -62,13 +62,13 @@ def compose(text: str, name: str) -> yaml.Node | None:
         raise SceneError("scene_yaml", message, hint="end lines by LF or CRLF")
     try:
         depth = 0
-        for event in yaml.parse(text, Loader=_Loader):
+        for event in yaml.parse(text, Loader=Loader):
             depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
             if isinstance(event, yaml.NodeEvent):
                 _check(event, name)
             if depth > MAX_DEPTH:
                 raise SceneError("scene_yaml", f"{name} may be nested at most {MAX_DEPTH} levels deep")
-        root = yaml.compose(text, Loader=_Loader)
+        root = yaml.compose(text, Loader=Loader)
     except yaml.MarkedYAMLError as error:
         where = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
         raise SceneError("scene_yaml", f"{name}{where}: {error.problem}", hint=MEND) from None

@@ -203,6 +203,12 @@ def test_a_bad_file_is_refused_with_what_is_wrong(tmp_path: Path, name: str, con
     assert refusal.value.field == "--path"
 
 
+def test_yaml_has_numbers_with_exponents(tmp_path: Path) -> None:
+    """YAML 1.1, which PyYAML reads by itself, takes 1e-3 for a text."""
+    (tmp_path / "a.yaml").write_text("q: [[1e-3, -2E+0], [.5, 3]]")
+    assert path_file(str(tmp_path / "a.yaml")).motion == {"q": [[0.001, -2.0], [0.5, 3.0]]}
+
+
 def test_numbers_that_are_not_finite_are_refused_in_arrays(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", q=[[0.0], [np.nan]])
     with pytest.raises(RegionError, match="q has numbers that are not finite"):

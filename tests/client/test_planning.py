@@ -125,7 +125,7 @@ def test_a_plan_that_is_not_found_says_why(ciris: Ciris, url: str, region: str, 
     wrong = ciris("plan", "slider", "--from", "0.1,0.2", "--to", "far", CIRIS_URL=url)
     assert (wrong.status, wrong.error.partition(" (")[0]) == (2, "--to: the scene has no configuration 'far'")
     longer = ciris("plan", "slider", "--from", "0.1,0.2", "--to", "0.1", CIRIS_URL=url)
-    assert (longer.status, longer.error.partition(" (")[0]) == (2, "--from: 2 numbers were given; slider has 1 joints")
+    assert (longer.status, longer.error.partition(" (")[0]) == (2, "--from: 2 numbers were given; the scene has 1 joints")
 
 
 def test_without_regions_a_motion_is_planned_and_its_proof_kept(ciris: Ciris, url: str, scene: Scene, tmp_path: Path) -> None:
