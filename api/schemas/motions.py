@@ -46,7 +46,8 @@ class Approach(Place):
     a: str = Field(description="The first geometry of the pair.")
     b: str = Field(description="The second geometry of the pair.")
     distance: float = Field(
-        description="How far the bodies, with the scene's padding, are apart there, in metres, in floating point; 0 where they overlap."
+        description="How far the bodies, with the scene's padding, are apart there, in metres, in floating point; 0 where they overlap. "
+        "It has no unit where the pair stands for a `cone` or a `range` of angles."
     )
 
 
