@@ -384,7 +384,8 @@ def _cell(scene: Scene, parts: Sequence[PairRow]) -> PairCell:
         proved_distance=proved,
         margin=proved,
         seconds=sum(seconds) if seconds else None,
-        detail=row.detail,
+        # What a search says of its open cells is about one part only.
+        detail=None if len(parts) > 1 and state is PairState.INCONCLUSIVE else row.detail,
         worker=row.worker,
         open_cells=sum(cells) if cells else None,
         witness_q=None if row.witness_s is None else scene.to_q(row.witness_s).tolist(),

@@ -12,6 +12,7 @@ from certifier.model import Scene
 from db import jobs
 from db.models import JobRow
 from db.session import Database
+from db.states import JobState
 from tests.db.builders import add_pairs
 
 
@@ -52,6 +53,18 @@ def shown(client: TestClient, query: str) -> set[str]:
 def test_jobs_are_filtered(client: TestClient, listed: dict[str, str], query: str, names: set[str]) -> None:
     assert shown(client, query) == {listed[name] for name in names}
     assert shown(client, query) == set(re.findall(r'href="/jobs/([^"]+)"', client.get(f"/live?{query}").text))
+
+
+def test_goals_that_samples_measure_are_not_called_certified(client: TestClient, database: Database, listed: dict[str, str]) -> None:
+    """A cover has reached its share, as samples say. Its regions are certified, and the share is not."""
+    with database.write() as session:
+        job = jobs.lock(session, listed["cover"])
+        jobs.start(session, job)
+        jobs.finish(session, job, JobState.SUCCEEDED, outcome="certified", reason="the goals are reached")
+    for path in ("/?kind=cover", f"/jobs/{job.id}"):
+        text = client.get(path).text
+        assert '<span class="badge computed">goals reached</span>' in text
+        assert 'badge certified' not in text
 
 
 def test_progress_is_shown(client: TestClient, listed: dict[str, str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from dataclasses import replace
 from functools import cache
@@ -104,6 +105,36 @@ def test_a_plan_is_played_to_its_end_with_the_region_of_each_moment(opened: Any,
     assert regions[1][:8] in opened.locator(".moment").text_content()
     assert opened.locator(".player output").text_content() == f"{saved['t'][-1]:.2f} s"
     assert shown(opened) == pytest.approx(np.rad2deg(saved["q"][-1]), abs=0.06)
+
+
+def test_only_the_overlaps_that_the_motion_goes_through_are_marked(page: Any, url: str, regions: list[str]) -> None:
+    """All three regions overlap each other. The motion goes from the first to the second and on to the third."""
+    page.route("**/v1/planning/graph*", lambda route: route.fulfill(json=triangle(regions)))
+    page.route("**/v1/planning/plan", lambda route: route.fulfill(json=through(regions)))
+    page.goto(f"{url}/scenes/planar")
+    page.get_by_text("1 component").wait_for()
+    legend = page.locator("section[aria-labelledby=h-graph] p").nth(1)
+    assert "planned" not in legend.text_content()
+    plan(page, "0, 0", "-10, 0")
+    page.locator(".moment", has_text="in region").wait_for()
+    assert page.locator(".edge").count() == 3
+    assert page.locator(".edge.planned").count() == 2
+    assert "one with a blue ring is on the way of the planned motion" in legend.text_content()
+    page.locator(".parts li.map", has_text="in proved cells of the map").wait_for()
+
+
+def triangle(regions: list[str]) -> dict[str, Any]:
+    nodes = [{"region": region, "component": 0} for region in regions]
+    edges = [{"a": a, "b": b, "depth": 0.1, "q": [0.0, 0.0]} for a, b in itertools.combinations(regions, 2)]
+    return {"scene": "", "version": 0, "complete": True, "components": 1, "nodes": nodes, "edges": edges, "gaps": []}
+
+
+def through(regions: list[str]) -> dict[str, Any]:
+    """A motion through three regions, and through the cells of a map."""
+    proved = [{"region": region, "map": None} for region in regions] + [{"region": None, "map": "a map"}]
+    pieces = [{"begin": i, "end": i + 1, "motion": None, "guarantee": "exact", **one} for i, one in enumerate(proved)]
+    motion = {"found": True, "q": [[0, 0], [-0.1, 0]], "t": [0, 4], "pieces": pieces, "length": 0.1, "duration": 4.0, "guarantee": "exact"}
+    return NO_MOTION | {"reason": None} | motion
 
 
 @pytest.mark.parametrize(

@@ -90,6 +90,25 @@ def test_the_address_keeps_the_configuration(opened: Any) -> None:
     assert opened.get_by_role("spinbutton", name="arm/joint1, degrees, as a number").input_value() == "10.0"
 
 
+def test_the_configuration_of_the_address_is_for_its_scene_only(opened: Any, planar: Scene, database: Database) -> None:
+    """Another scene with as many joints begins at its own q*, and nobody is told of an address that nobody typed."""
+    with database.write() as session:
+        other = replace(planar, name="other", padding=0.001)
+        scenes.add(session, other)
+    opened.reload()
+    opened.get_by_label("Scene", exact=True).select_option(label=f"other · 2 joints, {len(other.pairs)} pairs · {other.hash[:8]}")
+    opened.wait_for_url(f"**/new?scene={other.hash[:16]}&q=0,0")
+    assert opened.get_by_text("The address does not name").count() == 0
+
+
+def test_the_notice_quotes_what_the_address_named(page: Any, url: str, planar: Scene) -> None:
+    page.goto(f"{url}/new?scene=planar&q=0,-9")
+    page.get_by_text("The address does not name a configuration within the limits: 0,-9.").wait_for()
+    page.wait_for_url("**&q=0,-1.2")
+    set_joint(page, "arm/joint1", 5)
+    assert page.get_by_text("within the limits: 0,-9.").count() == 1
+
+
 def test_configurations_are_marked_to_be_connected(opened: Any, url: str, client: TestClient) -> None:
     opened.get_by_text("Cover the scene").click()
     opened.get_by_label("Goal").select_option("connect")

@@ -71,7 +71,7 @@ function Library({ model }: { model: SceneModel }) {
     () => (pair?.q === q ? model.geometries.flatMap(({ name }, i) => (name === pair.a || name === pair.b ? i : [])) : touchingOf(model, moment)),
     [moment, model, pair, q],
   );
-  const planned = useMemo(() => new Set(plan?.pieces.flatMap(({ region }) => region ?? []) ?? []), [plan]);
+  const way = useMemo(() => plan?.pieces.map(({ region }) => region) ?? [], [plan]);
   const holding = useMemo(() => new Set(moment.regions), [moment]);
   return (
     <div class="library">
@@ -97,8 +97,8 @@ function Library({ model }: { model: SceneModel }) {
                 <strong>{graph.nodes.length}</strong> {graph.nodes.length === 1 ? "region" : "regions"}, {graph.edges.length} {graph.edges.length === 1 ? "overlap" : "overlaps"}, <strong>{graph.components}</strong> {graph.components === 1 ? "component" : "components"}{!graph.complete && ", so far"}.{" "}
                 {covered && <>They cover <strong>{(100 * covered.value).toFixed(0)} ± {Number((100 * covered.stderr).toPrecision(1))} %</strong> of the free configurations, by a sample of {covered.free}.</>}
               </p>
-              <Graph graph={graph} holding={holding} planned={planned} chosen={chosen} onChoose={choose} />
-              <p class="quiet small">Choose a region to go to its centre. Ringed regions hold the configuration.</p>
+              <Graph graph={graph} holding={holding} way={way} chosen={chosen} onChoose={choose} />
+              <p class="quiet small">Choose a region to go to its centre. A region with a <span class="ring holding">dark ring</span> holds the configuration of the robot{way.some(Boolean) && <>; one with a <span class="ring planned">blue ring</span> is on the way of the planned motion</>}.</p>
               <details>
                 <summary>Overlaps as a table</summary>
                 <div class="scroll tall" tabIndex={0} role="region" aria-label="Overlaps">

@@ -115,10 +115,11 @@ export function Planning({ model, names, q, onMove, plan, onPlan }: Props) {
 }
 
 /** What proves a piece of the motion, in words. */
-function partOf({ begin, end, region, motion, guarantee }: Piece): Part {
+function partOf({ begin, end, region, map, motion, guarantee }: Piece): Part {
   const worth = <span class={`badge ${guarantee}`}>{guarantee}</span>;
-  return region
-    ? { begin, end, by: "region", said: <>in region <a href={`/regions/${region}`}>{region.slice(0, 8)}</a> {worth}</> }
+  if (region) return { begin, end, by: "region", said: <>in region <a href={`/regions/${region}`}>{region.slice(0, 8)}</a> {worth}</> };
+  return map
+    ? { begin, end, by: "map", said: <>in proved cells of the <a href={`/jobs/${map}`}>map</a> {worth}</> }
     : { begin, end, by: "motion", said: <>in the tube of the proved motion <code>{motion!.slice(0, 8)}</code> {worth}</> };
 }
 

@@ -14,7 +14,7 @@ export interface Motion {
 export interface Part {
   begin: number;
   end: number;
-  by: "region" | "motion" | "nothing";
+  by: "region" | "map" | "motion" | "nothing";
   said: ComponentChildren;
 }
 

@@ -14,7 +14,8 @@ import { Wishes } from "./wishes";
 const TRIES = 100;
 
 export function NewIsland({ parts }: { parts: Parts }) {
-  const asked = new URLSearchParams(location.search);
+  // The page rewrites its address, so it is read once. Its configuration is one of its scene, and of no other.
+  const [asked, setAsked] = useState(() => new URLSearchParams(location.search));
   const [scenes, setScenes] = useState<Scene[] | null>(null);
   const [chosen, setChosen] = useState<string | null>(asked.get("scene"));
   const [model, setModel] = useState<SceneModel | null>(null);
@@ -48,13 +49,17 @@ export function NewIsland({ parts }: { parts: Parts }) {
 
   if (!scenes) return <p class={problem ? "notice bad" : "empty"}>{problem ?? "Loading the scenes …"}</p>;
   const known = model && !scenes.some(({ id }) => id === model.scene) ? [{ id: model.scene, name: model.name, joints: model.q_star.length, pairs: model.pairs.length, warnings: 0 }, ...scenes] : scenes;
+  const choose = (scene: string): void => {
+    setAsked(new URLSearchParams());
+    setChosen(scene);
+  };
   const take = (scene: Scene): void => {
     setScenes([scene, ...scenes.filter(({ id }) => id !== scene.id)]);
-    setChosen(scene.id);
+    choose(scene.id);
   };
   return (
     <div class="new">
-      <ChooseScene scenes={known} chosen={chosen} onChoose={setChosen} onUpload={take} />
+      <ChooseScene scenes={known} chosen={chosen} onChoose={choose} onUpload={take} />
       {problem && <p class="notice bad">{problem}</p>}
       {model && model.scene === chosen && <Start model={model} parts={parts} asked={asked.get("q")} key={model.scene} />}
     </div>
