@@ -23,10 +23,17 @@ def scenes_page(request: Request, db: Db, after: Cursor = None) -> Response:
 
 @router.get("/scenes/{scene_id}")
 def scene_page(request: Request, scene_id: str, db: Db) -> Response:
+    scene, found = scenes.get_scene(scene_id, db), regions.list_regions(db, scene=scene_id).regions
+    newest = regions.get_region(found[0].id, db) if found else None
+    with db.read() as session:
+        number = region_counts(session, [scene.id])[scene.id]
     context = {
-        "scene": scenes.get_scene(scene_id, db),
+        "scene": scene,
         "lint": scenes.get_scene_lint(scene_id, db),
         "pairs": scenes.get_scene_pairs(scene_id, db).pairs,
-        "regions": regions.list_regions(db, scene=scene_id).regions,
+        "regions": found,
+        "number": number,
+        "newest": newest,
+        "distance": newest and min((pair["margin"] for pair in newest.manifest["pairs"] if pair["margin"] is not None), default=None),
     }
     return page(request, "scene.html", context)

@@ -2,8 +2,10 @@
 import { localTimes, startButtons } from "./buttons";
 import { startIslands } from "./islands";
 import { startLive } from "./live";
+import { watchClaim } from "./claim";
 
 localTimes(document);
 startButtons();
 startLive();
 startIslands(document);
+watchClaim();

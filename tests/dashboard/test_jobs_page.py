@@ -64,7 +64,7 @@ def test_goals_that_samples_measure_are_not_called_certified(client: TestClient,
     for path in ("/?kind=cover", f"/jobs/{job.id}"):
         text = client.get(path).text
         assert '<span class="badge computed">goals reached</span>' in text
-        assert 'badge certified' not in text
+        assert "badge certified" not in text
 
 
 def test_progress_is_shown(client: TestClient, listed: dict[str, str]) -> None:

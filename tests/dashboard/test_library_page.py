@@ -105,6 +105,16 @@ def test_a_plan_is_played_to_its_end_with_the_region_of_each_moment(opened: Any,
     assert regions[1][:8] in opened.locator(".moment").text_content()
     assert opened.locator(".player output").text_content() == f"{saved['t'][-1]:.2f} s"
     assert shown(opened) == pytest.approx(np.rad2deg(saved["q"][-1]), abs=0.06)
+    assert "on all of the planned motion, no collision of the covered pairs" in opened.locator(".claim").text_content()
+
+
+def test_the_robot_and_its_player_stay_in_view_while_the_page_scrolls(opened: Any) -> None:
+    plan(opened, degrees((-0.28, -0.1)), degrees((0.03, -0.1)))
+    play = opened.get_by_role("button", name="Play", exact=True)
+    play.wait_for()
+    canvas = opened.locator(".robot canvas").bounding_box()
+    claim = opened.locator(".claim").bounding_box()
+    assert claim["y"] + claim["height"] <= canvas["y"] < canvas["y"] + canvas["height"] <= play.bounding_box()["y"] < 720
 
 
 def test_only_the_overlaps_that_the_motion_goes_through_are_marked(page: Any, url: str, regions: list[str]) -> None:
@@ -182,7 +192,7 @@ def shown(page: Any) -> list[float]:
 def test_a_link_is_dragged_and_the_rest_of_the_view_turns(page: Any, url: str, planar: Scene) -> None:
     page.goto(f"{url}/scenes/planar")
     canvas = page.locator(".robot canvas")
-    page.locator(".said", has_text="Free here").wait_for()
+    page.locator(".said", has_text="No collision (computed").wait_for()
     box = canvas.bounding_box()
     middle, corner = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2), (box["x"] + 15, box["y"] + box["height"] - 15)
     drag(page, middle, 70)
@@ -206,7 +216,7 @@ def test_a_goal_in_collision_is_moved_to_a_free_configuration_near_by(page: Any,
     plan(page, "-20, 10", "22, 15")
     page.get_by_text("arm/link2/bar and world/obstacle touch at the goal").wait_for()
     page.get_by_role("button", name="Use the free configuration near by").press("Enter")
-    page.locator(".said", has_text="Free here").wait_for()
+    page.locator(".said", has_text="No collision (computed").wait_for()
     assert page.get_by_label("To", exact=True).input_value() != "22, 15"
     page.get_by_role("button", name="Plan a motion").press("Enter")
     page.locator(".moment", has_text="in the tube of the proved motion").wait_for()
@@ -334,7 +344,7 @@ def test_a_path_from_a_file_is_certified_and_played(page: Any, url: str, planar:
     said = page.locator(".upload .notice").text_content()
     proved = float(said.split("at least ")[1].split(" mm")[0])
     assert proved <= 1000 * verdict["clearance"] <= 1.02 * proved
-    assert "played as seconds" in page.locator(".upload").text_content()
+    assert "as seconds, from 0 on" in page.locator(".upload").text_content()
     page.get_by_label("speed").select_option("2")
     page.get_by_role("button", name="Play", exact=True).press("Enter")
     page.locator(".player output", has_text="1.50 s").wait_for()

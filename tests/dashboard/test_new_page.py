@@ -26,7 +26,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "planar_2dof"
 @pytest.fixture
 def opened(page: Any, url: str, planar: Scene) -> Any:
     page.goto(f"{url}/new?scene=planar&q=0.1,-0.2")
-    page.get_by_text("Free here").wait_for()
+    page.get_by_text("No collision (computed").wait_for()
     return page
 
 
@@ -79,14 +79,14 @@ def test_what_touches_is_said_live_and_no_job_starts_there(opened: Any, client: 
     opened.get_by_text("no region can hold the configuration").wait_for()
     assert jobs(client) == []
     opened.get_by_role("button", name="Random free one").click()
-    opened.get_by_text("Free here").wait_for()
+    opened.get_by_text("No collision (computed").wait_for()
 
 
 def test_the_address_keeps_the_configuration(opened: Any) -> None:
     set_joint(opened, "arm/joint1", 10)
     opened.wait_for_function("location.search.includes('q=0.1745,-0.2')")
     opened.reload()
-    opened.get_by_text("Free here").wait_for()
+    opened.get_by_text("No collision (computed").wait_for()
     assert opened.get_by_role("spinbutton", name="arm/joint1, degrees, as a number").input_value() == "10.0"
 
 
@@ -196,7 +196,7 @@ class Outer:
 def test_an_option_of_each_kind_gets_into_the_request(page: Any, url: str, planar: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Grow, "forms", {"seed": ("Seed", Inner), "options": ("Ways", Outer)})
     page.goto(f"{url}/new?scene=planar&q=0.1,-0.2")
-    page.get_by_text("Free here").wait_for()
+    page.get_by_text("No collision (computed").wait_for()
     for summary in page.locator("summary").all():
         summary.click()
     ways = page.get_by_role("group", name="Ways")
@@ -248,7 +248,7 @@ def test_nothing_keeps_people_out(browser: Any, url: str, planar: Scene, barrier
     context = browser.new_context(viewport={"width": 390, "height": 844}, color_scheme=scheme)
     page = context.new_page()
     page.goto(f"{url}/new?scene=planar")
-    page.get_by_text("Free here").wait_for()
+    page.get_by_text("No collision (computed").wait_for()
     for choice in ("Grow one region", "Cover the scene"):
         page.get_by_text(choice).click()
         page.get_by_role("button", name="Add this configuration").click()
