@@ -1,5 +1,6 @@
 // Keeps #live, a part of a page that the server writes, up to date: by asking again (data-poll), or when a job's island says so.
 import { localTimes } from "./buttons";
+import { localAngles } from "./common/units";
 
 const POLL_MS = 3000;
 
@@ -55,6 +56,7 @@ function replace(live: HTMLElement, html: string): void {
   const focused = [...live.querySelectorAll(focusable)].indexOf(document.activeElement!);
   live.innerHTML = html;
   localTimes(live);
+  localAngles(live);
   for (const id of open) document.getElementById(id)?.setAttribute("open", "");
   for (const [id, left, top] of scrolled) document.getElementById(id)?.scrollTo(left, top);
   if (focused >= 0) live.querySelectorAll<HTMLElement>(focusable)[focused]?.focus({ preventScroll: true });

@@ -112,7 +112,7 @@ def test_what_is_said_of_a_pair_is_said_on_hover_and_on_focus(page: Any, url: st
     tip.wait_for(state="detached")
     page.get_by_role("grid").focus()
     text = tip.text_content()
-    for part in ("too close in iteration 0", "2.0 s", "1 open cell", "0.001 m apart", "nearest at q = 0.4000"):
+    for part in ("too close in iteration 0", "2.0 s", "1 open cell", "0.001 m apart", "nearest at q = 0.400 m"):
         assert part in text
     page.keyboard.press("ArrowDown")
     page.get_by_text("open in iteration 0").wait_for()

@@ -2,6 +2,7 @@
 import { useEffect, useMemo, useReducer, useState } from "preact/hooks";
 import { get, said } from "../common/api";
 import type { SceneModel } from "../common/schema";
+import type { Unit } from "../common/units";
 import { Growth } from "./growth";
 import { Log } from "./log";
 import { Matrix, Memory } from "./matrix";
@@ -11,10 +12,10 @@ import { useRoute } from "./route";
 import { JobStore, type Drawable } from "./store";
 import { Workers } from "./workers";
 
-export function JobIsland({ job, subject, scene, ended, begun }: { job: string; subject: string; scene: string; ended: boolean; begun: number }) {
+export function JobIsland({ job, subject, scene, ended, begun, units }: { job: string; subject: string; scene: string; ended: boolean; begun: number; units: Unit[] }) {
   const [version, changed] = useReducer((count: number) => count + 1, 0);
   const [robot, setRobot] = useState<Drawable>({ model: null, problem: null });
-  const store = useMemo(() => new JobStore(job, ended, begun, () => changed(undefined)), [job]);
+  const store = useMemo(() => new JobStore(job, ended, begun, units, () => changed(undefined)), [job]);
   const memory = useMemo(() => new Memory(), []);
   const route = useRoute();
   useEffect(() => {

@@ -1,11 +1,12 @@
 // A motion from a start to a goal: asked for, said why there is none, or played.
 import { useMemo, useState } from "preact/hooks";
 import { post, said } from "../common/api";
-import { asText, movingBodies } from "../common/kinematics";
+import { movingBodies } from "../common/kinematics";
 import type { Piece, PlanResponse, SceneModel } from "../common/schema";
 import type { Part, Shown } from "./player";
 import { asked, PoseFields, typedAt, type Typed } from "./pose";
 import { Why } from "./why";
+import { asText, inWords, shown, typed } from "../common/units";
 
 interface Props {
   model: SceneModel;
@@ -22,17 +23,8 @@ interface End {
   q: number[] | null;
 }
 
-type Units = ("rad" | "m")[];
-
-const DEGREE = Math.PI / 180;
 /** How far a frame may be from a straight line. */
-const LINE = { metres: 1e-3, radians: 0.5 * DEGREE };
-
-/** Reads numbers in degrees and metres; null where they are not one for each joint. */
-function read(text: string, units: Units): number[] | null {
-  const numbers = text.split(/[\s,;]+/).filter(Boolean).map(Number);
-  return numbers.length === units.length && numbers.every(Number.isFinite) ? numbers.map((value, i) => (units[i] === "rad" ? value * DEGREE : value)) : null;
-}
+const LINE = { metres: 1e-3, radians: (0.5 * Math.PI) / 180 };
 
 export function Planning({ model, names, q, onMove, onShow }: Props) {
   const { units } = model;
@@ -45,7 +37,7 @@ export function Planning({ model, names, q, onMove, onShow }: Props) {
   const [plan, setPlan] = useState<PlanResponse | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
   const [asking, setAsking] = useState(false);
-  const words = units.every((unit) => unit === "rad") ? "degrees" : units.every((unit) => unit === "m") ? "metres" : "degrees and metres";
+  const words = inWords(units);
   const onPlan = (found: PlanResponse | null): void => {
     setPlan(found);
     onShow(found?.found ? shownOf(found) : null);
@@ -86,7 +78,7 @@ export function Planning({ model, names, q, onMove, onShow }: Props) {
   const field = (end: "start" | "goal") => (
     <>
       <label for={`plan-${end}`}>{end === "start" ? "From" : "To"}</label>
-      <input id={`plan-${end}`} value={ends[end].text} onInput={({ currentTarget: { value } }) => set(end, { text: value, q: read(value, units) })} aria-describedby="plan-units" spellcheck={false} autocomplete="off" />
+      <input id={`plan-${end}`} value={ends[end].text} onInput={({ currentTarget: { value } }) => set(end, { text: value, q: typed(value, units) })} aria-describedby="plan-units" spellcheck={false} autocomplete="off" />
       <button type="button" onClick={() => set(end, here(q))}>Set as {end}</button>
     </>
   );
@@ -114,7 +106,7 @@ export function Planning({ model, names, q, onMove, onShow }: Props) {
         {problem && <p class="notice bad">{problem}</p>}
         {plan && !plan.found && <Why plan={plan} names={names} units={units} onUse={use} onLook={onMove} />}
       </div>
-      {plan?.found && <p class="found"><strong>{plan.duration!.toFixed(2)} s</strong>, {plan.length!.toPrecision(3)} long in q. The robot's view plays it.</p>}
+      {plan?.found && <p class="found"><strong>{plan.duration!.toFixed(2)} s</strong>, {units.includes("m") ? `${plan.length!.toPrecision(3)} long in radians and metres` : `${shown(plan.length!, "rad")} long`}. The robot's view plays it.</p>}
     </div>
   );
 }

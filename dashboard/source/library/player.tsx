@@ -2,7 +2,8 @@
 import type { ComponentChildren } from "preact";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { LINKS } from "../common/colours";
-import { shortNames, shown } from "../common/kinematics";
+import { shortNames } from "../common/kinematics";
+import { shown } from "../common/units";
 
 /** A motion, straight in q between its configurations. The first time is 0. */
 export interface Motion {

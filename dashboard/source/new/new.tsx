@@ -1,7 +1,7 @@
 // The form that starts a job: a scene, a configuration that the robot shows, and what shall be done.
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { get, post, said, ServiceError } from "../common/api";
-import { asText, positions } from "../common/kinematics";
+import { positions } from "../common/kinematics";
 import { MomentText, touchingOf, useMoment } from "../common/moment";
 import { Robot } from "../common/robot";
 import type { ContactsResponse, Job, SceneDetail, SceneModel, ScenePage } from "../common/schema";
@@ -10,6 +10,7 @@ import { ChooseScene, type Scene } from "./choose";
 import type { Refused } from "./options";
 import { FIRST, request, type Parts, type Wish } from "./request";
 import { Wishes } from "./wishes";
+import { asText, withUnits } from "../common/units";
 
 const TRIES = 100;
 
@@ -79,7 +80,7 @@ function Start({ model, parts, asked }: { model: SceneModel; parts: Parts; asked
   const touching = useMemo(() => touchingOf(model, moment), [model, moment]);
   const body = request(model.scene, q, wish, parts);
 
-  useEffect(() => history.replaceState(null, "", `?scene=${model.scene}&q=${q.map((value) => Number(value.toFixed(4))).join(",")}`), [model, q.join()]);
+  useEffect(() => history.replaceState(null, "", withUnits(new URLSearchParams({ scene: model.scene, q: q.map((value) => Number(value.toFixed(4))).join(",") }))), [model, q.join()]);
 
   useEffect(() => {
     get<SceneDetail>(`/v1/scenes/${model.scene}`).then(
