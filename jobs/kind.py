@@ -80,8 +80,8 @@ class Kind:
         subject: what its jobs make, for people: ``the region``.
         request: the model of a request for such a job.
         template: of dashboard/templates, with the kind's part of the job's page.
-        forms: place of options in the request -> their title on the page that starts jobs, and the dataclass that has them; empty where
-            that page starts no such jobs.
+        forms: place of options in the request -> their title on the page that starts jobs, and the dataclass that has them; the place ""
+            is the request itself.
         makes_jobs: whether its regions are grown by jobs of their own.
         estimates: whether its outcome says that goals were reached which samples measure, so that it is no proof.
     """

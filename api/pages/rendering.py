@@ -31,7 +31,8 @@ def powers(unit: str) -> str:
 
 
 templates = Jinja2Templates(ROOT / "templates")
-templates.env.filters |= {"at_least_mm": at_least_mm, "at_most_mm": at_most_mm, "powers": powers, "degrees": math.degrees, "radians": math.radians}
+templates.env.filters |= {"at_least_mm": at_least_mm, "at_most_mm": at_most_mm, "powers": powers}
+templates.env.filters |= {"degrees": math.degrees, "radians": math.radians}
 
 
 def page(request: Request, name: str, context: dict[str, Any], status: int = 200) -> Response:

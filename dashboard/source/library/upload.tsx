@@ -3,7 +3,7 @@ import { useState } from "preact/hooks";
 import { post, said } from "../common/api";
 import type { Approach, MotionResponse, SceneModel } from "../common/schema";
 import type { Motion, Part, Shown } from "./player";
-import { readPath, type Path } from "./waypoints";
+import { readPath, type Path } from "../common/waypoints";
 
 interface Props {
   model: SceneModel;
