@@ -6,7 +6,9 @@ from typing import Any
 
 from fastapi import APIRouter, Request, Response
 
+from api.access import Db
 from api.pages.rendering import page
+from api.routers import scenes
 from certifier.options import Takes, table
 from certifier.seeding.options import Method
 from jobs.certify_path import CertifyPath, GivenMotion
@@ -22,13 +24,13 @@ OF_MOTIONS = (("clearance", Takes.FLAG), ("tube", Takes.FLAG), ("padding", Takes
 
 
 @router.get("/new")
-def new_job_page(request: Request) -> Response:
+def new_job_page(request: Request, db: Db) -> Response:
     parts = {
         kind.name: [{"place": place, "title": title, "options": _fields(cls)} for place, (title, cls) in kind.forms.items()]
         for kind in KINDS.values()
     }
     parts[CertifyPath.name] = [{"place": "", "title": "Motion", "options": [_of_motion(*one) for one in OF_MOTIONS]}]
-    return page(request, "new.html", {"parts": parts})
+    return page(request, "new.html", {"parts": parts, "empty": not scenes.list_scenes(db, limit=1).scenes})
 
 
 def _of_motion(name: str, takes: Takes) -> dict[str, Any]:

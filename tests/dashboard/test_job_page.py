@@ -202,7 +202,7 @@ def test_the_cells_of_a_drawing_are_those_that_are_open_and_proved(page: Any, ur
 def test_what_holds_the_region_back_is_said_and_drawn(page: Any, url: str, job_id: str) -> None:
     page.goto(f"{url}/jobs/{job_id}")
     page.get_by_text("model/cart/ball and world/post0 come too close: 0.001 m apart, as floating point says.").wait_for()
-    page.get_by_role("heading", name="What holds the region back").scroll_into_view_if_needed()
+    page.get_by_text("world/post0 are painted").scroll_into_view_if_needed()
     robot = page.get_by_role("img", name=re.compile(r"^The robot at slide 0\.400 m"))
     robot.wait_for()
     page.wait_for_timeout(300)

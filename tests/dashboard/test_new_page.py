@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from api.pages.job import remedies
+from api.pages.remedies import remedies
 from api.schemas.jobs import Job
 from certifier.model import Scene
 from certifier.options import option

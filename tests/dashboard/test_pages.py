@@ -132,10 +132,6 @@ def test_the_page_of_a_region_that_was_stored_before_there_were_shares(client: T
     assert client.get("/v1/regions").json()["regions"][0]["share"] is None
 
 
-def test_an_empty_service_says_how_to_begin(client: TestClient) -> None:
-    assert "ciris grow" in client.get("/").text
-
-
 NOW = datetime(2026, 1, 1, tzinfo=UTC)
 
 
