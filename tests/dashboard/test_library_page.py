@@ -202,6 +202,40 @@ def test_a_link_is_dragged_and_the_rest_of_the_view_turns(page: Any, url: str, p
     assert shown(page) == there, "no link is there"
 
 
+def test_bodies_are_hidden_and_named_from_a_tree_and_the_view_stands_elsewhere(opened: Any, planar: Scene) -> None:
+    canvas = opened.locator(".robot canvas")
+
+    def looks(*, after: str) -> bytes:
+        """A picture that differs from the last one."""
+        opened.wait_for_timeout(200)
+        seen.append(canvas.screenshot())
+        assert seen[-1] != seen[-2], after
+        return seen[-1]
+
+    seen = [canvas.screenshot()]
+    for view in ("front", "top"):
+        opened.get_by_role("button", name=f"View: {view}").click()
+        looks(after=view)
+    opened.get_by_label("frames").check()
+    looks(after="frames")
+    opened.locator(".view-tools summary").click()
+    tree = opened.locator(".view-tools details")
+    assert {name.strip() for name in tree.locator("label").all_text_contents()} == {*planar.bodies}
+    nested = tree.locator("li", has=opened.get_by_label("arm/link1")).locator("li").get_by_label("arm/link2")
+    assert nested.count() == 1, "the second link hangs on the first"
+    tree.get_by_label("arm/link2").focus()
+    looks(after="pointing at a body")
+    tree.get_by_label("arm/link2").uncheck()
+    looks(after="hiding it")
+    opened.get_by_text("bodies, 1 hidden").wait_for()
+    before = shown(opened)
+    opened.get_by_role("button", name="View: fit").click()
+    looks(after="fit")
+    assert shown(opened) == before
+    tree.get_by_label("arm/link2").check()
+    looks(after="showing it again")
+
+
 def drag(page: Any, at: tuple[float, float], down: float) -> None:
     page.mouse.move(*at)
     page.mouse.down()
