@@ -1,4 +1,4 @@
-"""The page of a job in a real browser: live to its end, its pairs, their cells, what holds the region back, and a job that is large."""
+"""The page of a job in a real browser: live to its end, its pairs, their cells, what limits the region, and a job that is large."""
 
 from __future__ import annotations
 
@@ -74,12 +74,12 @@ def test_the_page_finds_out_who_works_without_an_event(page: Any, url: str, data
         jobs.start(session, job)
         steps.add(session, job, "propose", {})
     page.goto(f"{url}/jobs/{job.id}")
-    page.get_by_text("No process works for the job at this moment.").wait_for()
+    page.get_by_text("No process works on the job at this moment.").wait_for()
     assert page.locator(".title .badge").text_content() == "queued: no worker"
     page.get_by_text("Queued: no worker.").wait_for()
     with database.write() as session:
         assert work.claim(session, job.id, lease_seconds=60, batch_seconds=0.5) is not None
-    page.get_by_text("looks for the first polytope").wait_for()
+    page.get_by_text("looks for the starting region").wait_for()
     page.locator(".title .badge", has_text="working").wait_for()
 
 

@@ -62,7 +62,7 @@ def test_the_graph_shows_what_overlaps_and_leads_into_a_region(opened: Any, regi
     node.focus()
     node.press("Enter")
     opened.locator(".said", has_text=f"In a certified region: {regions[2][:8]}").wait_for()
-    assert opened.locator(".node.holding").count() == 1
+    assert opened.locator(".graph .halo").count() == 1
     opened.get_by_text("Overlaps as a table").click()
     opened.get_by_role("button", name="go to the overlap").click()
     opened.get_by_text("In 2 certified regions").wait_for()
@@ -129,7 +129,7 @@ def test_only_the_overlaps_that_the_motion_goes_through_are_marked(page: Any, ur
     page.locator(".moment", has_text="in region").wait_for()
     assert page.locator(".edge").count() == 3
     assert page.locator(".edge.planned").count() == 2
-    assert "one with a blue ring is on the way of the planned motion" in legend.text_content()
+    assert "A blue edge: the planned motion goes through it." in legend.text_content()
     page.locator(".parts li.map", has_text="in proved cells of the map").wait_for()
 
 

@@ -375,7 +375,7 @@ def test_an_option_of_each_kind_gets_into_the_request(page: Any, url: str, plana
 def test_what_is_wrong_with_an_option_is_said_at_its_field(opened: Any, client: TestClient, complaints: list[str]) -> None:
     more = opened.locator("details", has_text="More options")
     more.locator("summary").click()
-    cells, tolerance = opened.get_by_label("Cells"), opened.get_by_role("group", name="First polytope").get_by_label("Tolerance")
+    cells, tolerance = opened.get_by_label("Cells"), opened.get_by_role("group", name="Starting region").get_by_label("Tolerance")
     cells.fill("0")
     more.locator("summary").click()
     opened.get_by_role("button", name="Start the job").click()

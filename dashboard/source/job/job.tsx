@@ -1,4 +1,4 @@
-// The page of a job, below its head: the matrix of pairs or one of them, what holds the region back, how it grew, and who works on it.
+// The page of a job, below its head: the matrix of pairs or one of them, what limits the region, how it grew, and who works on it.
 import { useEffect, useMemo, useReducer, useState } from "preact/hooks";
 import { get, said } from "../common/api";
 import type { SceneModel } from "../common/schema";

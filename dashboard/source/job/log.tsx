@@ -5,7 +5,7 @@ import { duration, plural } from "./outcomes";
 import type { JobStore } from "./store";
 
 const STEPS: Record<string, string> = {
-  propose: "Looking for a first polytope around the seed",
+  propose: "Looking for a starting region around the seed",
   step: "Moving the faces of the region",
   accept: "Putting the region's proof together and verifying it",
   scout: "Looking at what is covered",
@@ -70,7 +70,7 @@ export function sentence({ kind, data }: Event): string {
     }
     case "region": {
       const share = (data.share as { value: number | null } | null)?.value;
-      const kept = share == null ? "" : `; it keeps ${(100 * share).toPrecision(3)} % of the proposal, as samples say`;
+      const kept = share == null ? "" : `; it keeps ${(100 * share).toPrecision(3)} % of the starting region, as samples say`;
       return `A region is certified in iteration ${number} (${text("guarantee")})${kept}.`;
     }
     case "note": {

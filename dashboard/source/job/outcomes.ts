@@ -21,7 +21,7 @@ export const OUTCOMES: Record<string, Outcome> = {
   s: { name: "skipped", glyph: "−", words: "skipped" },
   "-": { name: "absent", glyph: "", words: "not reached" },
   c: { name: "certified", glyph: "✓", words: "certified" },
-  u: { name: "reused", glyph: "↺", words: "certified by an earlier proof" },
+  u: { name: "reused", glyph: "↺", words: "still proved" },
 };
 
 const ORDER = Object.keys(OUTCOMES).join("");

@@ -50,7 +50,7 @@ export function Graph({ graph, holding, way, chosen, onChoose }: Props) {
         const { x, y } = places[i]!;
         const marks = [holding.has(region) && "holds the configuration", planned.has(region) && "on the planned way"].filter(Boolean).join(", ");
         const shape = SHAPES[component % SHAPES.length]!;
-        const common = { fill: LINKS[component % LINKS.length], class: `node${holding.has(region) ? " holding" : ""}${planned.has(region) ? " planned" : ""}${chosen === region ? " chosen" : ""}` };
+        const common = { fill: LINKS[component % LINKS.length], class: `node${planned.has(region) ? " planned" : ""}${chosen === region ? " chosen" : ""}` };
         const label = `region ${region.slice(0, 8)}, component ${component + 1}${marks && `, ${marks}`}`;
         return (
           <g
@@ -68,6 +68,7 @@ export function Graph({ graph, holding, way, chosen, onChoose }: Props) {
             }}
           >
             <title>{label}</title>
+            {holding.has(region) && <circle class="halo" cx={x} cy={y} r={1.7 * radius} />}
             {shape === "circle" ? <circle cx={x} cy={y} r={radius} {...common} /> : <rect x={x - radius} y={y - radius} width={2 * radius} height={2 * radius} transform={shape === "diamond" ? `rotate(45 ${x} ${y})` : undefined} {...common} />}
           </g>
         );

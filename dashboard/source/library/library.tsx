@@ -104,7 +104,7 @@ function Library({ model }: { model: SceneModel }) {
                 {covered && <>They cover <strong>{(100 * covered.value).toFixed(0)} ± {Number((100 * covered.stderr).toPrecision(1))} %</strong> of the free configurations, by a sample of {covered.free}.</>}
               </p>
               <Graph graph={graph} holding={holding} way={way} chosen={chosen} onChoose={choose} />
-              <p class="quiet small">Choose a region to go to its centre. A region with a <span class="ring holding">dark ring</span> holds the configuration of the robot{way.some(Boolean) && <>; one with a <span class="ring planned">blue ring</span> is on the way of the planned motion</>}.</p>
+              <p class="quiet small">Choose a region to go to its centre. A ring around a region: it holds the configuration of the robot.{way.some(Boolean) && " A blue edge: the planned motion goes through it."}</p>
               <details>
                 <summary>Overlaps as a table</summary>
                 <div class="scroll tall" tabIndex={0} role="region" aria-label="Overlaps">
