@@ -93,11 +93,11 @@ def test_a_job_is_watched_to_its_end(page: Any, url: str, database: Database, jo
     page.get_by_text("1 result in iteration 0: 1 certified").wait_for()
     assert all(item.bounding_box()["height"] > 20 for item in page.locator(".log li").all()), "every event can be read"
     page.get_by_text("2 of 2 pairs settled").wait_for()
-    assert page.get_by_role("heading", name="Workers").count() == 1
+    assert page.get_by_role("heading", name="Working on it").count() == 1
     finish(database, job_id)
     page.locator(".badge.succeeded").wait_for()
     page.get_by_text("The job has succeeded with the outcome inconclusive: as asked.").wait_for()
-    assert page.get_by_role("heading", name="Workers").count() == 0
+    assert page.get_by_role("heading", name="Working on it").count() == 0
     assert page.get_by_role("button", name="Cancel").count() == 0
     page.get_by_label("Show events").select_option("job")
     assert page.locator(".log li").count() == page.locator(".log li[data-kind=job]").count() >= 2

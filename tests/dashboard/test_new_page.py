@@ -208,6 +208,14 @@ def test_the_form_the_command_curl_and_python_ask_for_the_same_job(
         assert lasts(other) == pytest.approx(lasts(mine)) == 120
 
 
+def test_the_text_is_copied(opened: Any) -> None:
+    opened.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    text = copied(opened, "curl")
+    opened.get_by_role("button", name="Copy", exact=True).click()
+    opened.get_by_role("button", name="Copied").wait_for()
+    assert opened.evaluate("navigator.clipboard.readText()") == text
+
+
 def lasts(job: dict[str, Any]) -> float:
     """The seconds that a job has from its creation to its deadline."""
     return (datetime.fromisoformat(job["deadline_at"]) - datetime.fromisoformat(job["created_at"])).total_seconds()
