@@ -11,6 +11,7 @@ from fastapi.testclient import TestClient
 from certifier.model import Array, Scene
 from certifier.pair.collisions import in_collision
 from certifier.verify.decimals import at_least_mm
+from tests.dashboard.test_truth import until
 
 READY = "The robot is inside the region"
 
@@ -61,7 +62,7 @@ def test_the_claim_stays_in_view_and_names_what_it_does_not_cover(opened: Any, c
     assert facts[2].endswith("in exact arithmetic")
     opened.get_by_role("heading", name="Pairs").scroll_into_view_if_needed()
     opened.mouse.wheel(0, 4000)
-    opened.wait_for_function("scrollY > 300")
+    until(lambda: opened.evaluate("scrollY") > 300)
     assert claim.bounding_box()["y"] == pytest.approx(0, abs=1)
     for path in (f"regions/{planar_region}", f"scenes/{region['scene']}", f"jobs/{region['job']}"):
         opened.goto(f"{url}/{path}")

@@ -1,4 +1,5 @@
 // The page of a job, below its head: the matrix of pairs or one of them, what limits the region, how it grew, and who works on it.
+import type { ComponentType } from "preact";
 import { useEffect, useMemo, useReducer, useState } from "preact/hooks";
 import { get, said } from "../common/api";
 import type { SceneModel } from "../common/schema";
@@ -11,6 +12,13 @@ import { Pair } from "./pair";
 import { useRoute } from "./route";
 import { JobStore, type Drawable } from "./store";
 import { Workers } from "./workers";
+
+/** The motion of a job, once what draws it is there: three.js is large. */
+function Moved(props: { job: string; scene: string }) {
+  const [Motion, setMotion] = useState<ComponentType<typeof props> | null>(null);
+  useEffect(() => void import("./motion").then((module) => setMotion(() => module.Motion)), []);
+  return Motion && <Motion {...props} />;
+}
 
 export function JobIsland({ job, subject, scene, ended, begun, units }: { job: string; subject: string; scene: string; ended: boolean; begun: number; units: Unit[] }) {
   const [version, changed] = useReducer((count: number) => count + 1, 0);
@@ -51,6 +59,7 @@ export function JobIsland({ job, subject, scene, ended, begun, units }: { job: s
       ) : (
         <>
           {store.iterations.length > 0 && <Matrix store={store} version={version} memory={memory} />}
+          {store.ended && subject === "the motion" && <Moved job={job} scene={scene} />}
           <Growth points={store.growth} />
           <Obstacles
             obstacles={store.obstacles}

@@ -13,6 +13,8 @@ interface Props {
   onShow: (motion: Shown | null) => void;
 }
 
+type MotionVerdict = Pick<MotionResponse, "certified_to" | "stop" | "clearance" | "proved_distance" | "seconds" | "verify_seconds">;
+
 interface Answered {
   path: Path;
   verdict: MotionResponse;
@@ -89,7 +91,7 @@ function atLeast(value: number): string {
   return Number((Math.floor(value / unit) * unit).toPrecision(3)).toString();
 }
 
-function shownOf(path: Path, verdict: MotionResponse): Shown {
+export function shownOf(path: Path, verdict: MotionVerdict): Shown {
   const motion = timed(path);
   const parts = partsOf(motion, verdict);
   const { stop, clearance, proved_distance, seconds, verify_seconds } = verdict;
@@ -109,7 +111,7 @@ function timed({ q, t }: Path): Motion {
   return { q, t: times };
 }
 
-function partsOf({ t }: Motion, { certified_to: to, stop }: MotionResponse): Part[] {
+function partsOf({ t }: Motion, { certified_to: to, stop }: MotionVerdict): Part[] {
   const end = t.at(-1)!;
   if (!stop) return [{ begin: 0, end, by: "motion", said: "on the path, which is certified" }];
   const until = to ? t[to.piece]! + to.time * (t[to.piece + 1]! - t[to.piece]!) : 0;
