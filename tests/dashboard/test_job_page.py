@@ -96,7 +96,7 @@ def test_a_job_is_watched_to_its_end(page: Any, url: str, database: Database, jo
     assert page.get_by_role("heading", name="Working on it").count() == 1
     finish(database, job_id)
     page.locator(".badge.succeeded").wait_for()
-    page.get_by_text("The job has succeeded with the outcome inconclusive: as asked.").wait_for()
+    page.get_by_text("The job has succeeded: as asked.").wait_for()
     assert page.get_by_role("heading", name="Working on it").count() == 0
     assert page.get_by_role("button", name="Cancel").count() == 0
     page.get_by_label("Show events").select_option("job")

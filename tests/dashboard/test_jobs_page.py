@@ -190,3 +190,13 @@ def test_an_empty_list_says_where_to_begin(page: Any, url: str) -> None:
     page.goto(url)
     page.get_by_role("link", name="Start one here").click()
     page.get_by_text("or upload one").wait_for()
+
+
+def test_the_log_of_a_cover_does_not_call_its_goals_certified(page: Any, url: str, database: Database, listed: dict[str, str]) -> None:
+    with database.write() as session:
+        job = jobs.lock(session, listed["cover"])
+        jobs.start(session, job)
+        jobs.finish(session, job, JobState.SUCCEEDED, outcome="certified", reason="the goals are reached")
+    page.goto(f"{url}/jobs/{listed['cover']}")
+    page.get_by_text("The job has succeeded: the goals are reached.").wait_for()
+    assert page.get_by_text("certified", exact=True).count() == 0

@@ -138,7 +138,7 @@ export function Slice(props: Props) {
         <span class="key-map certified"><span class="proved">in a certified region</span></span> <span class="key-map free"><span class="computed">no collision at the sample</span></span> <span class="key-map taken"><span class="computed">in collision</span></span>
         {cells && <> <span class="key-map cells">cells</span></>}
         <br />
-        {problem ? <strong class="bad">{problem}</strong> : answer && current ? summary(answer) : "Computing …"}
+        {problem ? <strong class="bad">{problem}</strong> : answer && current ? <span class="computed">{summary(answer)}</span> : "Computing …"}
       </figcaption>
     </figure>
   );

@@ -51,8 +51,9 @@ export function sentence({ kind, data }: Event): string {
   const state = text("state"), number = text("iteration") || text("index");
   switch (kind) {
     case "job": {
-      const outcome = where("outcome", ` with the outcome ${text("outcome")}`);
-      return `The job ${IS[state] ?? state}${outcome}${data.reason === data.outcome ? "" : where("reason", `: ${data.reason}`)}.`;
+      // The reason says more than the outcome, which for a cover or a map is about samples.
+      const why = data.reason && data.reason !== data.outcome ? `: ${data.reason}` : where("outcome", ` with the outcome ${text("outcome")}`);
+      return `The job ${IS[state] ?? state}${why}.`;
     }
     case "iteration": {
       const one = `Iteration ${number} (${text("label")})`;

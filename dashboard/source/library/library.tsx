@@ -101,7 +101,7 @@ function Library({ model }: { model: SceneModel }) {
             <>
               <p>
                 <strong>{graph.nodes.length}</strong> {graph.nodes.length === 1 ? "region" : "regions"}, {graph.edges.length} {graph.edges.length === 1 ? "overlap" : "overlaps"}, <strong>{graph.components}</strong> {graph.components === 1 ? "component" : "components"}{!graph.complete && ", so far"}.{" "}
-                {covered && <>They cover <strong>{(100 * covered.value).toFixed(0)} ± {Number((100 * covered.stderr).toPrecision(1))} %</strong> of the free configurations, by a sample of {covered.free}.</>}
+                {covered && <><span class="computed">They cover <strong>{(100 * covered.value).toFixed(0)} ± {Number((100 * covered.stderr).toPrecision(1))} %</strong> of the free configurations</span>, by a sample of {covered.free}.</>}
               </p>
               <Graph graph={graph} holding={holding} way={way} chosen={chosen} onChoose={choose} />
               <p class="quiet small">Choose a region to go to its centre. A ring around a region: it holds the configuration of the robot.{way.some(Boolean) && " A blue edge: the planned motion goes through it."}</p>
