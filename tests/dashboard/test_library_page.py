@@ -16,6 +16,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from certifier.jobs.region import Region
 from certifier.model import Scene
+from certifier.verify.decimals import at_least_mm
 from db import scenes
 from db.session import Database
 from planner.poses.frame import frame_of, pose_at, pose_of
@@ -66,6 +67,14 @@ def test_the_graph_shows_what_overlaps_and_leads_into_a_region(opened: Any, regi
     opened.get_by_text("Overlaps as a table").click()
     opened.get_by_role("button", name="go to the overlap").click()
     opened.get_by_text("In 2 certified regions").wait_for()
+
+
+def test_the_claim_of_a_scene_says_which_region_its_distance_is_of(opened: Any, client: TestClient, regions: list[str]) -> None:
+    newest = client.get("/v1/regions").json()["regions"][0]["id"]
+    least = min(pair["margin"] for pair in client.get(f"/v1/regions/{newest}").json()["manifest"]["pairs"])
+    words = opened.locator(".claim dl").inner_text()
+    assert f"Smallest proved distance of the newest region\nat least {at_least_mm(least)}" in words
+    assert "in each of the 3 certified regions of this scene" in opened.locator(".claim").text_content()
 
 
 def test_coverage_is_that_of_the_same_configurations(opened: Any, client: TestClient, planar: Scene) -> None:
