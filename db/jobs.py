@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime, timedelta
-from typing import Any
+from typing import Any, TypedDict, Unpack
 from uuid import uuid4
 
-from sqlalchemy import and_, exists, func, or_, select
+from sqlalchemy import Select, and_, exists, func, or_, select
 from sqlalchemy.orm import Session, aliased
 
 from certifier.errors import CirisError
@@ -183,33 +183,49 @@ def _found(job: JobRow | None, job_id: str) -> JobRow:
     return job
 
 
+class Filters(TypedDict, total=False):
+    """Says which jobs are wanted. Without ``parent_id`` they are those that somebody asked for, and with it those of a cover."""
+
+    state: str | None
+    kind: str | None
+    outcome: str | None
+    scene_id: str | None
+    key_id: str | None
+    ended: bool | None
+    parent_id: str | None
+    given_labels: Mapping[str, str] | None
+    search: str | None
+
+
 def page(
-    session: Session,
-    *,
-    state: str | None = None,
-    kind: str | None = None,
-    scene_id: str | None = None,
-    ended: bool | None = None,
-    parent_id: str | None = None,
-    given_labels: Mapping[str, str] | None = None,
-    search: str | None = None,
-    after: str | None = None,
-    limit: int = 50,
+    session: Session, *, after: str | None = None, before: str | None = None, limit: int = 50, **filters: Unpack[Filters]
 ) -> Page[JobRow]:
-    """Returns one page of the jobs that match the filters: of those that somebody asked for, or of those of a cover, ``parent_id``.
+    """Returns one page of the jobs that match the filters.
+
+    Args:
+        after, before: the ``next`` or the ``previous`` of another page.
 
     Raises:
         CirisError: cursor.
     """
-    filters = {JobRow.state: state, JobRow.kind: kind, JobRow.scene_id: scene_id}
-    query = select(JobRow).where(*(column == value for column, value in filters.items() if value is not None))
-    if ended is not None:
+    return pages.page(session, JobRow, _matching(**filters), after, limit, before)
+
+
+def count(session: Session, **filters: Unpack[Filters]) -> int:
+    """Returns how many jobs match the filters."""
+    return session.scalar(select(func.count()).select_from(_matching(**filters).subquery())) or 0
+
+
+def _matching(**filters: Unpack[Filters]) -> Select[JobRow]:
+    columns = (JobRow.state, JobRow.kind, JobRow.outcome, JobRow.scene_id, JobRow.key_id)
+    query = select(JobRow).where(*(column == value for column in columns if (value := filters.get(column.key)) is not None))
+    if (ended := filters.get("ended")) is not None:
         query = query.where(JobRow.state.in_(unfinished(JOB)) != ended)
-    if given_labels:
+    if given_labels := filters.get("given_labels"):
         query = query.where(labels.has(given_labels))
-    if search is not None:
+    if (search := filters.get("search")) is not None:
         query = query.where(labels.mentions(search))
-    return pages.page(session, JobRow, query.where(JobRow.parent_id.is_not_distinct_from(parent_id)), after, limit)
+    return query.where(JobRow.parent_id.is_not_distinct_from(filters.get("parent_id")))
 
 
 def children(session: Session, job_id: str) -> Sequence[JobRow]:

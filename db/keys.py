@@ -184,6 +184,24 @@ def check_bind(settings: Settings) -> None:
         raise CirisError("no_keys", problem, field="CIRIS_HOST", hint="`ciris key add NAME --scope admin` makes one")
 
 
+def names(session: Session) -> Sequence[str]:
+    """Returns the names of the project's keys, in order, those of revoked keys too."""
+    return session.scalars(select(ApiKeyRow.name).distinct().order_by(ApiKeyRow.name)).all()
+
+
+def named(session: Session, name: str) -> str:
+    """Returns the id of the project's newest key of this name.
+
+    Raises:
+        CirisError: key_not_found.
+    """
+    query = select(ApiKeyRow.id).where(ApiKeyRow.name == name).order_by(ApiKeyRow.created_at.desc()).limit(1)
+    found = session.scalar(query)
+    if found is None:
+        raise CirisError("key_not_found", f"there is no key {name!r}", field="key", hint="`ciris key ls` lists them")
+    return found
+
+
 def _active(session: Session, name: str, project: str) -> Sequence[ApiKeyRow]:
     mine = (ApiKeyRow.project == project, ApiKeyRow.name == name)
     return session.scalars(select(ApiKeyRow).where(*mine, ApiKeyRow.revoked_at.is_(None))).all()

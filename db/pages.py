@@ -23,22 +23,30 @@ Row = TypeVar("Row", ApiKeyRow, AuditRow, JobRow, RegionRow, SceneRow, WorkerRow
 
 @dataclass(frozen=True)
 class Page(Generic[Row]):
-    """A page holds rows, newest first, and what to pass as ``after`` for the next page (None on the last)."""
+    """A page holds rows, newest first, what to pass as ``after`` for the next page (None on the last), and as ``before`` for the page
+    before it (None on the first).
+    """
 
     rows: Sequence[Row]
     next: str | None
+    previous: str | None = None
 
 
-def page(session: Session, model: type[Row], query: Select[Row], after: str | None, limit: int) -> Page[Row]:
+def page(session: Session, model: type[Row], query: Select[Row], after: str | None, limit: int, before: str | None = None) -> Page[Row]:
     """Returns one page of the rows that the query finds.
 
     Raises:
-        CirisError: cursor, when ``after`` did not come from a page.
+        CirisError: cursor, when ``after`` or ``before`` did not come from a page.
     """
+    if before is not None:
+        newer = query.where(tuple_(model.created_at, model.id) > tuple_(*_place(before)))
+        nearest = session.scalars(newer.order_by(model.created_at, model.id).limit(limit + 1)).all()
+        rows = nearest[:limit][::-1]
+        return Page(rows, _cursor(rows[-1]) if rows else None, _cursor(rows[0]) if len(nearest) > limit else None)
     if after is not None:
         query = query.where(tuple_(model.created_at, model.id) < tuple_(*_place(after)))
     rows = session.scalars(query.order_by(model.created_at.desc(), model.id.desc()).limit(limit + 1)).all()
-    return Page(rows[:limit], _cursor(rows[limit - 1]) if len(rows) > limit else None)
+    return Page(rows[:limit], _cursor(rows[limit - 1]) if len(rows) > limit else None, _cursor(rows[0]) if after and rows else None)
 
 
 def _cursor(row: ApiKeyRow | AuditRow | JobRow | RegionRow | SceneRow | WorkerRow) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from sqlalchemy import and_, func, select
+from sqlalchemy import Select, and_, exists, func, or_, select
 from sqlalchemy.orm import Session
 
 from certifier.configurations import Configurations
@@ -215,10 +215,26 @@ def get(session: Session, name: str) -> SceneRow:
     return session.get_one(SceneRow, find(session, name))
 
 
-def page(session: Session, after: str | None = None, limit: int = 100) -> Page[SceneRow]:
-    """Returns one page of the scenes.
+def page(
+    session: Session, after: str | None = None, limit: int = 100, before: str | None = None, search: str | None = None
+) -> Page[SceneRow]:
+    """Returns one page of the scenes: of all, or of those whose id begins with a text, or that have a name with it.
 
     Raises:
         CirisError: cursor.
     """
-    return pages.page(session, SceneRow, select(SceneRow), after, limit)
+    return pages.page(session, SceneRow, _matching(search), after, limit, before)
+
+
+def count(session: Session, search: str | None = None) -> int:
+    """Returns how many scenes there are on the pages."""
+    return session.scalar(select(func.count()).select_from(_matching(search).subquery())) or 0
+
+
+def _matching(search: str | None) -> Select[SceneRow]:
+    if search is None:
+        return select(SceneRow)
+    named = exists().where(SceneNameRow.scene_id == SceneRow.id, SceneNameRow.name.icontains(search, autoescape=True))
+    return select(SceneRow).where(
+        or_(SceneRow.id.startswith(search, autoescape=True), SceneRow.name.icontains(search, autoescape=True), named)
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 
@@ -43,6 +43,7 @@ class Certify(Growing):
 
     name = "certify"
     request = CertifyRequest
+    forms: ClassVar = {"": ("Certification", CertifyOptions)}
 
     def options(self, body: CertifyRequest, scene: Scene, db: Database) -> dict[str, Any]:
         given = body.polytope

@@ -96,9 +96,13 @@ class Verdict:
         outcome, stop = Outcome(found["outcome"]), found["stop"]
         if stop is None:
             return cls(outcome, "every pair is certified all along the motion")
-        touch = "come nearer than the padding of the request allows" if found.get("padding") else "touch"
-        how = {Outcome.REFUTED: touch, Outcome.TOO_CLOSE: "are too close to tell"}.get(outcome, "are where the search ended")
-        return cls(outcome, f"{fails(stop['a'], stop['b'], how)}, on piece {stop['piece']}; pieces count from 0")
+        return cls(outcome, f"{fails(stop['a'], stop['b'], _how(found))}, on piece {stop['piece']}; pieces count from 0")
+
+
+def _how(found: dict[str, Any]) -> str:
+    """Returns what the two bodies do where a motion could not be certified. A contact is proved, whatever floating point says."""
+    touch = "come nearer than the padding of the request allows" if found.get("padding") else "touch"
+    return {Outcome.REFUTED: touch, Outcome.TOO_CLOSE: "are too close to tell"}.get(Outcome(found["outcome"]), "are where the search ended")
 
 
 class CertifyPath(Kind):
@@ -161,7 +165,11 @@ class CertifyPath(Kind):
 
     def held(self, session: Session, scene: Scene, job: JobRow) -> list[Held]:
         verdict = self.verdict(session, job)
-        return [] if verdict is None or verdict["stop"] is None else [obstacles.of_motion(scene, verdict["stop"])]
+        return [] if verdict is None or verdict["stop"] is None else [obstacles.of_motion(scene, verdict["stop"], _how(verdict))]
+
+    def result(self, session: Session, job: JobRow) -> dict[str, Any]:
+        """Returns the ``verdict``, or None before it."""
+        return {"verdict": self.verdict(session, job)}
 
     def verdict(self, session: Session, job: JobRow) -> dict[str, Any] | None:
         """Returns what the step of a job has found; None while it has not ended, where it has failed, and for another kind of job."""

@@ -65,6 +65,7 @@ class Cover(Kind):
     template = "kinds/cover.html"
     forms: ClassVar = {"options": ("Cover", CoverOptions)}
     makes_jobs = True
+    estimates = True
 
     def options(self, body: CoverRequest, scene: Scene, db: Database) -> dict[str, Any]:
         given = body.options.model_dump()

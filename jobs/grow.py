@@ -41,7 +41,7 @@ class Grow(Growing):
 
     name = "grow"
     request = GrowRequest
-    forms: ClassVar = {"seed": ("First polytope", SeedOptions), "options": ("Growth", GrowthOptions)}
+    forms: ClassVar = {"seed": ("Starting region", SeedOptions), "options": ("Growth", GrowthOptions)}
 
     def options(self, body: GrowRequest, scene: Scene, db: Database) -> dict[str, Any]:
         seed = SeedOptions.from_document(body.seed.model_dump(exclude_none=True))

@@ -80,9 +80,10 @@ class Kind:
         subject: what its jobs make, for people: ``the region``.
         request: the model of a request for such a job.
         template: of dashboard/templates, with the kind's part of the job's page.
-        forms: place of options in the request -> their title on the page that starts jobs, and the dataclass that has them; empty where
-            that page starts no such jobs.
+        forms: place of options in the request -> their title on the page that starts jobs, and the dataclass that has them; the place ""
+            is the request itself.
         makes_jobs: whether its regions are grown by jobs of their own.
+        estimates: whether its outcome says that goals were reached which samples measure, so that it is no proof.
     """
 
     name: ClassVar[str]
@@ -91,6 +92,7 @@ class Kind:
     template: ClassVar[str] = "kinds/region.html"
     forms: ClassVar[dict[str, tuple[str, type]]] = {}
     makes_jobs: ClassVar[bool] = False
+    estimates: ClassVar[bool] = False
 
     def options(self, body: Any, scene: Scene, db: Database) -> dict[str, Any]:
         """Returns the options of a job from its request, after comparing the request with the scene.

@@ -82,6 +82,7 @@ class Map(Kind):
     subject = "the map"
     request = MapRequest
     template = "kinds/map.html"
+    estimates = True
     forms: ClassVar = {"options": ("Map", MapOptions)}
 
     def options(self, body: MapRequest, scene: Scene, db: Database) -> dict[str, Any]:

@@ -40,10 +40,9 @@ def of_growth(session: Session, scene: Scene, job: JobRow) -> list[Held]:
     return [_of_pair(scene, i, cut.get(i), failed.get(i, [])) for _, i in sorted(rated)]
 
 
-def of_motion(scene: Scene, stop: dict[str, Any]) -> Held:
-    """Returns the first place on a motion that could not be certified."""
+def of_motion(scene: Scene, stop: dict[str, Any], how: str) -> Held:
+    """Returns the first place on a motion that could not be certified; ``how`` says what the two bodies do there."""
     pair = Pair(stop["a"], stop["b"])
-    how = "touch" if stop["distance"] <= 0 else f"are only {stop['distance']:.3g} m apart"
     text = f"{fails(pair.a, pair.b, how)} at the configuration named, the first on the motion that could not be certified."
     index = scene.pairs.index(pair) if pair in scene.pairs else None
     return Held(text, stop["q"], index, pair.a, pair.b)
@@ -103,7 +102,7 @@ def _how_it_failed(pair: Pair, state: PairState, row: PairRow, failed: Sequence[
             return f"{names} could not be certified{detail}."
         case _:
             cells = sum(part.open_cells or 0 for part in failed)
-            some = f": {cells} cell{'' if cells == 1 else 's'} are open in all" if len(failed) > 1 and cells else detail
+            some = f": {'1 cell is' if cells == 1 else f'{cells} cells are'} open in all" if len(failed) > 1 and cells else detail
             return f"{names} are not certified{some}."
 
 

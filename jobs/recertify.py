@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 
@@ -40,6 +40,7 @@ class Recertify(Growing):
 
     name = "recertify"
     request = RecertifyRequest
+    forms: ClassVar = {"": ("Certification", RecertifyOptions)}
 
     def options(self, body: RecertifyRequest, scene: Scene, db: Database) -> dict[str, Any]:
         with db.read() as session:

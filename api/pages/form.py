@@ -6,9 +6,12 @@ from typing import Any
 
 from fastapi import APIRouter, Request, Response
 
+from api.access import Db
 from api.pages.rendering import page
+from api.routers import scenes
 from certifier.options import Takes, table
 from certifier.seeding.options import Method
+from jobs.certify_path import CertifyPath, GivenMotion
 from jobs.registry import KINDS
 
 router = APIRouter()
@@ -16,15 +19,25 @@ router = APIRouter()
 LISTS = (Takes.POINT, Takes.POINTS, Takes.PATHS)
 """The form has no fields for lists of numbers, nor for the method that needs them."""
 
+OF_MOTIONS = (("clearance", Takes.FLAG), ("tube", Takes.FLAG), ("padding", Takes.REAL))
+"""What may be asked for of a motion."""
+
 
 @router.get("/new")
-def new_job_page(request: Request) -> Response:
+def new_job_page(request: Request, db: Db) -> Response:
     parts = {
-        kind: [{"place": place, "title": title, "options": _fields(cls)} for place, (title, cls) in places.items()]
-        for kind, places in ((kind.name, kind.forms) for kind in KINDS.values())
-        if places
+        kind.name: [{"place": place, "title": title, "options": _fields(cls)} for place, (title, cls) in kind.forms.items()]
+        for kind in KINDS.values()
     }
-    return page(request, "new.html", {"parts": parts})
+    parts[CertifyPath.name] = [{"place": "", "title": "Motion", "options": [_of_motion(*one) for one in OF_MOTIONS]}]
+    return page(request, "new.html", {"parts": parts, "empty": not scenes.list_scenes(db, limit=1).scenes})
+
+
+def _of_motion(name: str, takes: Takes) -> dict[str, Any]:
+    """Describes a field of the request for a motion."""
+    known = GivenMotion.model_fields[name]
+    described = {"name": name, "takes": takes, "text": known.description, "default": known.default, "argument": name}
+    return {**described, "unit": "", "least": 0.0 if takes is Takes.REAL else None, "greatest": None, "choices": [], "options": []}
 
 
 def _fields(cls: type) -> list[dict[str, Any]]:
@@ -34,6 +47,7 @@ def _fields(cls: type) -> list[dict[str, Any]]:
             "name": one.name,
             "takes": one.takes,
             "text": one.described,
+            "argument": one.argument,
             "unit": one.unit,
             "default": one.default if isinstance(one.default, int | float | str) else None,
             "least": one.above if one.least is None else one.least,

@@ -10,12 +10,14 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 
 from api.access import Db
+from api.pages.remedies import remedies
 from api.pages.rendering import page
 from api.routers import jobs, regions, scenes, webhooks
 from api.schemas.common import MAX_INT
 from api.schemas.jobs import Iteration, Job, PairMatrix
 from api.schemas.webhooks import Webhook
 from certifier.errors import CirisError
+from certifier.model import JointKind
 from db import events, pairs
 from db import jobs as rows
 from db.session import Database
@@ -36,7 +38,7 @@ def job_live(request: Request, job_id: str, db: Db) -> Response:
 
 def _job(db: Database, job_id: str) -> dict[str, Any]:
     job = jobs.get_job(job_id, db)
-    kind = KINDS[job.kind]
+    kind, scene = KINDS[job.kind], scenes.get_scene(job.scene, db)
     with db.read() as session:
         note = events.last(session, job.id, events.NOTE)
         begun, result = pairs.begun(session, job.id), kind.result(session, rows.get(session, job.id))
@@ -47,12 +49,14 @@ def _job(db: Database, job_id: str) -> dict[str, Any]:
         "kind": kind,
         "result": result,
         "elapsed": elapsed(job),
-        "scene": scenes.get_scene(job.scene, db),
+        "scene": scene,
+        "units": ["rad" if joint.kind is JointKind.REVOLUTE else "m" for joint in scene.positions],
         "begun": begun,
         "note": note and note["text"],
         "progress": None if last is None else progress(last),
         "regions": regions.list_regions(db, job=job_id).regions,
         "webhook": _webhook(db, job.id),
+        "remedies": remedies(job),
     }
 
 

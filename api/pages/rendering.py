@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from http import HTTPStatus
 from pathlib import Path
@@ -31,6 +32,7 @@ def powers(unit: str) -> str:
 
 templates = Jinja2Templates(ROOT / "templates")
 templates.env.filters |= {"at_least_mm": at_least_mm, "at_most_mm": at_most_mm, "powers": powers}
+templates.env.filters |= {"degrees": math.degrees, "radians": math.radians}
 
 
 def page(request: Request, name: str, context: dict[str, Any], status: int = 200) -> Response:

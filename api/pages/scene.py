@@ -2,31 +2,56 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response
+from typing import Annotated
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request, Response
 
 from api.access import Db
 from api.pages.rendering import page
 from api.routers import regions, scenes
 from api.schemas.common import Cursor
+from api.schemas.scenes import SceneSummary
+from db import scenes as known_scenes
 from db.regions import counts as region_counts
+from jobs import patterns
 
 router = APIRouter()
 
+Sought = Annotated[str, Query(max_length=200, pattern=patterns.ANY)]
+
 
 @router.get("/scenes")
-def scenes_page(request: Request, db: Db, after: Cursor = None) -> Response:
-    found = scenes.list_scenes(db, after)
+def scenes_page(request: Request, db: Db, after: Cursor = None, before: Cursor = None, search: Sought = "") -> Response:
     with db.read() as session:
-        numbers = region_counts(session, [scene.id for scene in found.scenes])
-    return page(request, "scenes.html", {"scenes": found.scenes, "next": found.next, "regions": numbers})
+        found, total = known_scenes.page(session, after, 100, before, search or None), known_scenes.count(session, search or None)
+        ids = [row.id for row in found.rows]
+        numbers, names = region_counts(session, ids), known_scenes.names(session, ids)
+    wanted = {"search": search} if search else {}
+    context = {
+        "scenes": [SceneSummary.of(row, names[row.id]) for row in found.rows],
+        "total": total,
+        "search": search,
+        "older": urlencode(wanted | {"after": found.next}) if found.next else None,
+        "newer": urlencode(wanted | {"before": found.previous}) if found.previous else None,
+        "regions": numbers,
+    }
+    return page(request, "scenes.html", context)
 
 
 @router.get("/scenes/{scene_id}")
 def scene_page(request: Request, scene_id: str, db: Db) -> Response:
+    scene, found = scenes.get_scene(scene_id, db), regions.list_regions(db, scene=scene_id).regions
+    newest = regions.get_region(found[0].id, db) if found else None
+    with db.read() as session:
+        number = region_counts(session, [scene.id])[scene.id]
     context = {
-        "scene": scenes.get_scene(scene_id, db),
+        "scene": scene,
         "lint": scenes.get_scene_lint(scene_id, db),
         "pairs": scenes.get_scene_pairs(scene_id, db).pairs,
-        "regions": regions.list_regions(db, scene=scene_id).regions,
+        "regions": found,
+        "number": number,
+        "newest": newest,
+        "distance": newest and min((pair["margin"] for pair in newest.manifest["pairs"] if pair["margin"] is not None), default=None),
     }
     return page(request, "scene.html", context)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections.abc import Iterable
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
@@ -11,6 +11,7 @@ from api.access import Db, Reader
 from api.pages.rendering import page
 from api.routers import workers
 from api.schemas.common import Cursor
+from api.schemas.workers import Worker
 from db.keys import Scope
 from db.models import DEFAULT_PROJECT
 from db.states import WorkerState
@@ -31,7 +32,14 @@ def workers_live(request: Request, caller: Reader, db: Db, after: Cursor = None)
 def _crew(caller: Reader, db: Db, after: str | None) -> dict[str, Any]:
     found = workers.list_workers(db, after)
     may_ask = caller.scope.includes(Scope.ADMIN) and caller.project == DEFAULT_PROJECT
-    takes_work = [one for one in found.workers if one.wanted == WorkerState.RUNNING]
-    kinds = Counter(one.kind for one in takes_work)
-    last = {one.id for one in takes_work if kinds[one.kind] == 1}
-    return {"workers": found.workers, "missing": found.missing, "last": last, "next": found.next, "after": after, "may_ask": may_ask}
+    last = _last(one for one in found.workers if one.wanted == WorkerState.RUNNING)
+    context = {"last": last, "last_of_all": last | _last(one for one in found.workers if one.wanted != WorkerState.DRAINING)}
+    return {"workers": found.workers, "missing": found.missing, **context, "next": found.next, "after": after, "may_ask": may_ask}
+
+
+def _last(workers: Iterable[Worker]) -> set[str]:
+    """Returns the ids of the workers that are the only one of their kind."""
+    alike: dict[str, list[str]] = {}
+    for one in workers:
+        alike.setdefault(one.kind, []).append(one.id)
+    return {ids[0] for ids in alike.values() if len(ids) == 1}

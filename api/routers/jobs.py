@@ -105,7 +105,7 @@ def create_job(
     else:
         response.status_code = status.HTTP_200_OK
     response.headers["Location"] = f"/v1/jobs/{job.id}"
-    return _described(db, [job])[0]
+    return described(db, [job])[0]
 
 
 @router.post("/batch", status_code=status.HTTP_201_CREATED)
@@ -131,7 +131,7 @@ def create_jobs(
     for job, new in made:
         if new:
             background.add_task(announcements.announce, job.id)
-    return JobList(jobs=_described(db, [job for job, _ in made]))
+    return JobList(jobs=described(db, [job for job, _ in made]))
 
 
 @router.post("/cancel", dependencies=[SUBMIT], status_code=status.HTTP_202_ACCEPTED)
@@ -149,10 +149,10 @@ def cancel_jobs(body: CancelRequest, db: Db, background: BackgroundTasks, announ
         with db.write() as session:
             cancelled.append(jobs.cancel(session, job_id))
         background.add_task(announcements.announce, job_id)
-    return JobList(jobs=_described(db, cancelled))
+    return JobList(jobs=described(db, cancelled))
 
 
-def _described(db: Database, rows: Sequence[JobRow]) -> list[Job]:
+def described(db: Database, rows: Sequence[JobRow]) -> list[Job]:
     """Describes jobs: with what they do now, how far they are, their labels and the shares of their last regions."""
     with db.read() as session:
         does, settled = activity.of_jobs(session, rows), progress.of_jobs(session, rows)
@@ -192,7 +192,7 @@ def list_jobs(
             after=after,
             limit=limit,
         )
-    return JobPage(jobs=_described(db, page.rows), next=page.next)
+    return JobPage(jobs=described(db, page.rows), next=page.next)
 
 
 @router.get("/{job_id}")
@@ -200,7 +200,7 @@ def get_job(job_id: JobGiven, db: Db) -> Job:
     """Returns one job as it is now."""
     with db.read() as session:
         job = jobs.get(session, job_id)
-    return _described(db, [job])[0]
+    return described(db, [job])[0]
 
 
 @router.get("/{job_id}/dependents")
@@ -229,7 +229,7 @@ def cancel_job(job_id: JobGiven, db: Db, background: BackgroundTasks, announceme
     with db.write() as session:
         job = jobs.cancel(session, job_id)
     background.add_task(announcements.announce, job.id)
-    return _described(db, [job])[0]
+    return described(db, [job])[0]
 
 
 @router.post("/{job_id}/retry", status_code=status.HTTP_201_CREATED)
@@ -245,7 +245,7 @@ def retry_job(
         job = jobs.retry(session, job_id, caller.key_id)
     background.add_task(announcements.announce, job.id)
     response.headers["Location"] = f"/v1/jobs/{job.id}"
-    return _described(db, [job])[0]
+    return described(db, [job])[0]
 
 
 @router.get("/{job_id}/pairs")
@@ -384,7 +384,8 @@ def _cell(scene: Scene, parts: Sequence[PairRow]) -> PairCell:
         proved_distance=proved,
         margin=proved,
         seconds=sum(seconds) if seconds else None,
-        detail=row.detail,
+        # What a search says of its open cells is about one part only.
+        detail=None if len(parts) > 1 and state is PairState.INCONCLUSIVE else row.detail,
         worker=row.worker,
         open_cells=sum(cells) if cells else None,
         witness_q=None if row.witness_s is None else scene.to_q(row.witness_s).tolist(),

@@ -224,9 +224,12 @@ class CellCertification:
             s, distance = self._nearest(search, np.concatenate(report.narrow))
             detail = f"the padded bodies are {distance:.3g} m apart at the configuration named, too close for a plane"
             return replace(result, outcome=Outcome.TOO_CLOSE, witness_s=s, detail=detail)
+        if not cells:
+            return replace(result, detail="no cell is open; the cells are yet to be put together and verified")
         inside = sum(((self._area.samples >= low) & (self._area.samples <= up)).all(axis=1).mean() for low, up in cells)
         share = f"{100 * float(inside):.2g} %" if inside >= 1e-4 else "less than 0.01 %"
-        detail = f"{len(cells)} cells, {share} of the polytope, are open after {report.cells} cells"
+        open_ = "1 cell is" if len(cells) == 1 else f"{len(cells)} cells are"
+        detail = f"{open_} open, with {share} of the polytope, as samples say; this round searched {report.cells}"
         return replace(result, detail=detail)
 
     def _outline(self, search: Search, volumes: Volumes, streams: dict[str, Array]) -> Outline:

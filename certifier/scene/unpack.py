@@ -9,8 +9,10 @@ from typing import Any
 
 from certifier.errors import SceneError
 from certifier.scene.bundle import INDEX, SMALLER, BundleLimits
+from certifier.scene.draft import draft
 from certifier.scene.file import read_scene_file
 from certifier.scene.macros import in_xacro
+from certifier.scene.packages import packages_of
 from certifier.scene.parse import parse
 from certifier.scene.references import is_mjcf, references, resolve
 
@@ -22,6 +24,8 @@ _LITTER = {"__MACOSX", ".DS_Store"}
 """A Mac puts these into every zip. They are left out."""
 SCENE_FILE = "scene.yaml"
 """A zip without an index has its scene in this file."""
+MODELS = (".urdf", ".sdf", ".mjcf")
+"""A zip without a scene file is taken for the robot whose model it has."""
 
 
 def parse_bundle(payload: dict[str, Any]) -> dict[str, Any]:
@@ -31,9 +35,25 @@ def parse_bundle(payload: dict[str, Any]) -> dict[str, Any]:
         SceneError: as :func:`certifier.scene.bundle.load_bundle` says.
     """
     root = Path(payload["root"])
-    scene = root / unpack(Path(payload["archive"]), root, BundleLimits(**payload["limits"]))
+    found = root / unpack(Path(payload["archive"]), root, BundleLimits(**payload["limits"]))
+    scene = _drafted(root, found) if found.suffix in MODELS else found
     check_bundle(root, scene)
     return parse({"path": str(scene)})
+
+
+def _drafted(root: Path, model: Path) -> Path:
+    """Writes a scene file for a robot's model that came without one, as ``ciris scene init`` does, and returns its path.
+
+    Drake sees the model once it has passed with a scene file that has nothing but the model.
+    """
+    scene = root / f"{model.stem}.yaml"
+    packages = packages_of(model, {}, {}, {}, root)[0]
+    directive = {"add_model": {"name": "model", "file": model.relative_to(root).as_posix()}}
+    besides = {"packages": {name: path.relative_to(root).as_posix() for name, path in packages.items() if path.is_relative_to(root)}}
+    scene.write_text(json.dumps({"name": "draft", "directives": [directive], **(besides if packages else {})}), encoding="utf-8")
+    check_bundle(root, scene)
+    scene.write_text(draft(model, [], scene, packages).text, encoding="utf-8")
+    return scene
 
 
 def check_bundle(root: Path, scene: Path) -> None:
@@ -91,10 +111,12 @@ def unpack(bundle: Path, root: Path, limits: BundleLimits) -> str:
 
 
 def _only_scene(root: Path) -> str:
-    """Returns the path of the scene file in a zip that somebody made of a directory, which names none."""
+    """Returns the path of the scene file in a zip that somebody made of a directory, which names none; or of the only model there is."""
     found = list(root.rglob(SCENE_FILE)) or list(root.rglob("*.yaml"))
+    if not found:
+        found = next((some for kind in MODELS if (some := list(root.rglob(f"*{kind}")))), [])
     if len(found) != 1:
-        message = f"the zip has no {INDEX}, and {len(found) or 'no'} files that may be the scene file"
+        message = f"the zip has no {INDEX}, and {len(found) or 'no'} files that may be the scene file or the robot's model"
         raise SceneError("bundle_zip", message, field="bundle", hint=f"zip a directory with one {SCENE_FILE}, or use `ciris scene add`")
     return found[0].relative_to(root).as_posix()
 

@@ -17,12 +17,17 @@ def rounded_up(x: float, digits: int = 3, times: int = 1) -> str:
 
 def at_least_mm(metres: float) -> str:
     """Returns a lower bound, given in metres, as a text in millimetres that is rounded down."""
-    return f"{rounded_down(metres, times=1000)} mm"
+    return f"{_plain(rounded_down(metres, times=1000))} mm"
 
 
 def at_most_mm(metres: float) -> str:
     """Returns an upper bound, given in metres, as a text in millimetres that is rounded up."""
-    return f"{rounded_up(metres, times=1000)} mm"
+    return f"{_plain(rounded_up(metres, times=1000))} mm"
+
+
+def _plain(decimal: str) -> str:
+    """Returns a large decimal without an exponent, which nobody reads in a distance."""
+    return f"{Decimal(decimal):f}" if "e+" in decimal else decimal
 
 
 def exactly(x: float) -> str:

@@ -1,5 +1,5 @@
 // Buttons with data-post ask the service to do something; forms with data-submit-on-change need no button; times are shown as the reader's clock has them.
-import { post, said } from "./common/api";
+import { post, said, upload } from "./common/api";
 import { refresh } from "./live";
 
 interface Answer {
@@ -20,6 +20,8 @@ export function startButtons(): void {
   document.addEventListener("click", (click) => {
     const button = (click.target as Element).closest<HTMLButtonElement>("button[data-post]");
     if (button) void press(button);
+    const sample = (click.target as Element).closest<HTMLButtonElement>("button[data-sample]");
+    if (sample) void addSample(sample);
   });
   for (const form of document.querySelectorAll<HTMLFormElement>("form[data-submit-on-change]")) {
     form.querySelector("button")!.hidden = true;
@@ -42,6 +44,19 @@ async function press(button: HTMLButtonElement): Promise<void> {
       say(document.getElementById(statement)!, answer);
       button.disabled = false;
     } else void refresh(document.getElementById("live")!.dataset.refresh!);
+  } catch (problem) {
+    button.disabled = false;
+    complain(button, said(problem));
+  }
+}
+
+/** Adds a scene that comes with the service, and opens the form with it. */
+async function addSample(button: HTMLButtonElement): Promise<void> {
+  button.disabled = true;
+  try {
+    const file = await (await fetch(button.dataset.sample!)).blob();
+    const { id } = await upload<{ id: string }>("/v1/scenes", "bundle", new File([file], "sample.zip", { type: "application/zip" }));
+    location.assign(`/new?scene=${id}&q=${button.dataset.q}`);
   } catch (problem) {
     button.disabled = false;
     complain(button, said(problem));

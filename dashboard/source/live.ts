@@ -1,5 +1,6 @@
 // Keeps #live, a part of a page that the server writes, up to date: by asking again (data-poll), or when a job's island says so.
 import { localTimes } from "./buttons";
+import { localAngles } from "./common/units";
 
 const POLL_MS = 3000;
 
@@ -47,15 +48,27 @@ export async function refresh(url: string): Promise<void> {
   if (!ok) again = setTimeout(() => void refresh(url), POLL_MS);
 }
 
-// What the reader has opened, scrolled or focused stays as it was.
+const FOCUSABLE = "a, button, summary, [tabindex]";
+
+/** Says what a focusable element is for; a row that comes before it does not change that. */
+function purpose(element: Element): string {
+  return ["href", "data-post", "id", "aria-label"].map((name) => element.getAttribute(name)).join(" ") + element.textContent;
+}
+
+let last = "";
+
+// What the reader has opened, scrolled, focused or selected stays as it was. While text is selected, the part waits.
 function replace(live: HTMLElement, html: string): void {
-  const focusable = "a, button, summary, [tabindex]";
+  const selection = getSelection();
+  if (html === last || (selection && !selection.isCollapsed && live.contains(selection.anchorNode))) return;
+  last = html;
   const open = [...live.querySelectorAll("details[open][id]")].map((element) => element.id);
   const scrolled = [...live.querySelectorAll(".scroll[id]")].map((element) => [element.id, element.scrollLeft, element.scrollTop] as const);
-  const focused = [...live.querySelectorAll(focusable)].indexOf(document.activeElement!);
+  const focused = live.contains(document.activeElement) ? purpose(document.activeElement!) : null;
   live.innerHTML = html;
   localTimes(live);
+  localAngles(live);
   for (const id of open) document.getElementById(id)?.setAttribute("open", "");
   for (const [id, left, top] of scrolled) document.getElementById(id)?.scrollTo(left, top);
-  if (focused >= 0) live.querySelectorAll<HTMLElement>(focusable)[focused]?.focus({ preventScroll: true });
+  if (focused !== null) [...live.querySelectorAll<HTMLElement>(FOCUSABLE)].find((element) => purpose(element) === focused)?.focus({ preventScroll: true });
 }

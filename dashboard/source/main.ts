@@ -2,8 +2,13 @@
 import { localTimes, startButtons } from "./buttons";
 import { startIslands } from "./islands";
 import { startLive } from "./live";
+import { watchClaim } from "./claim";
+import { localAngles, startUnits } from "./common/units";
 
 localTimes(document);
+localAngles(document);
 startButtons();
 startLive();
+startUnits();
 startIslands(document);
+watchClaim();

@@ -51,7 +51,7 @@ def seed(example: str) -> Any:
 def views(browser: Browser, url: str, ids: dict[str, str]) -> None:
     """Takes the pictures."""
     planned = f"/scenes/{ids['planar']}"
-    shoot(browser, f"{url}/new?scene={ids['planar']}&q=0.3,-0.6", "dashboard_new", ".said >> text=/Free|certified/")
+    shoot(browser, f"{url}/new?scene={ids['planar']}&q=0.3,-0.6", "dashboard_new", ".said >> text=/computed|certified/")
     shoot(browser, f"{url}{planned}", "dashboard_scene", "text=/component/", planning)
     shoot(browser, f"{url}{planned}", "dashboard_scene_dark", "text=/component/", planning, scheme="dark")
     shoot(browser, f"{url}/regions/{ids['region']}", "dashboard_region", "text=of this slice is certified")

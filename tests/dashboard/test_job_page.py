@@ -1,4 +1,4 @@
-"""The page of a job in a real browser: live to its end, its pairs, their cells, what holds the region back, and a job that is large."""
+"""The page of a job in a real browser: live to its end, its pairs, their cells, what limits the region, and a job that is large."""
 
 from __future__ import annotations
 
@@ -74,12 +74,12 @@ def test_the_page_finds_out_who_works_without_an_event(page: Any, url: str, data
         jobs.start(session, job)
         steps.add(session, job, "propose", {})
     page.goto(f"{url}/jobs/{job.id}")
-    page.get_by_text("No process works for the job at this moment.").wait_for()
+    page.get_by_text("No process works on the job at this moment.").wait_for()
     assert page.locator(".title .badge").text_content() == "queued: no worker"
     page.get_by_text("Queued: no worker.").wait_for()
     with database.write() as session:
         assert work.claim(session, job.id, lease_seconds=60, batch_seconds=0.5) is not None
-    page.get_by_text("looks for the first polytope").wait_for()
+    page.get_by_text("looks for the starting region").wait_for()
     page.locator(".title .badge", has_text="working").wait_for()
 
 
@@ -93,11 +93,11 @@ def test_a_job_is_watched_to_its_end(page: Any, url: str, database: Database, jo
     page.get_by_text("1 result in iteration 0: 1 certified").wait_for()
     assert all(item.bounding_box()["height"] > 20 for item in page.locator(".log li").all()), "every event can be read"
     page.get_by_text("2 of 2 pairs settled").wait_for()
-    assert page.get_by_role("heading", name="Workers").count() == 1
+    assert page.get_by_role("heading", name="Working on it").count() == 1
     finish(database, job_id)
     page.locator(".badge.succeeded").wait_for()
-    page.get_by_text("The job has succeeded with the outcome inconclusive: as asked.").wait_for()
-    assert page.get_by_role("heading", name="Workers").count() == 0
+    page.get_by_text("The job has succeeded: as asked.").wait_for()
+    assert page.get_by_role("heading", name="Working on it").count() == 0
     assert page.get_by_role("button", name="Cancel").count() == 0
     page.get_by_label("Show events").select_option("job")
     assert page.locator(".log li").count() == page.locator(".log li[data-kind=job]").count() >= 2
@@ -112,7 +112,7 @@ def test_what_is_said_of_a_pair_is_said_on_hover_and_on_focus(page: Any, url: st
     tip.wait_for(state="detached")
     page.get_by_role("grid").focus()
     text = tip.text_content()
-    for part in ("too close in iteration 0", "2.0 s", "1 open cell", "0.001 m apart", "nearest at q = 0.4000"):
+    for part in ("too close in iteration 0", "2.0 s", "1 open cell", "0.001 m apart", "nearest at q = 0.400 m"):
         assert part in text
     page.keyboard.press("ArrowDown")
     page.get_by_text("open in iteration 0").wait_for()
@@ -202,7 +202,7 @@ def test_the_cells_of_a_drawing_are_those_that_are_open_and_proved(page: Any, ur
 def test_what_holds_the_region_back_is_said_and_drawn(page: Any, url: str, job_id: str) -> None:
     page.goto(f"{url}/jobs/{job_id}")
     page.get_by_text("model/cart/ball and world/post0 come too close: 0.001 m apart, as floating point says.").wait_for()
-    page.get_by_role("heading", name="What holds the region back").scroll_into_view_if_needed()
+    page.get_by_text("world/post0 are painted").scroll_into_view_if_needed()
     robot = page.get_by_role("img", name=re.compile(r"^The robot at slide 0\.400 m"))
     robot.wait_for()
     page.wait_for_timeout(300)

@@ -19,7 +19,7 @@ def submit(page: Any, url: str) -> str:
     """Starts a job in the form, around the configuration (-20, -12) degrees, and returns its id."""
     page.goto(url)
     page.get_by_role("link", name="Start a job").first.click()
-    page.locator(".said", has_text=re.compile("Free here|as proved")).wait_for()
+    page.locator(".said", has_text=re.compile(r"No collision \(computed|as proved")).wait_for()
     set_joint(page, "arm/joint1", -20)
     set_joint(page, "arm/joint2", -12)
     page.locator("summary", has_text="More options").click()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from dataclasses import replace
 from functools import cache
@@ -15,6 +16,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from certifier.jobs.region import Region
 from certifier.model import Scene
+from certifier.verify.decimals import at_least_mm
 from db import scenes
 from db.session import Database
 from planner.poses.frame import frame_of, pose_at, pose_of
@@ -61,10 +63,18 @@ def test_the_graph_shows_what_overlaps_and_leads_into_a_region(opened: Any, regi
     node.focus()
     node.press("Enter")
     opened.locator(".said", has_text=f"In a certified region: {regions[2][:8]}").wait_for()
-    assert opened.locator(".node.holding").count() == 1
+    assert opened.locator(".graph .halo").count() == 1
     opened.get_by_text("Overlaps as a table").click()
     opened.get_by_role("button", name="go to the overlap").click()
     opened.get_by_text("In 2 certified regions").wait_for()
+
+
+def test_the_claim_of_a_scene_says_which_region_its_distance_is_of(opened: Any, client: TestClient, regions: list[str]) -> None:
+    newest = client.get("/v1/regions").json()["regions"][0]["id"]
+    least = min(pair["margin"] for pair in client.get(f"/v1/regions/{newest}").json()["manifest"]["pairs"])
+    words = opened.locator(".claim dl").inner_text()
+    assert f"Smallest proved distance of the newest region\nat least {at_least_mm(least)}" in words
+    assert "in each of the 3 certified regions of this scene" in opened.locator(".claim").text_content()
 
 
 def test_coverage_is_that_of_the_same_configurations(opened: Any, client: TestClient, planar: Scene) -> None:
@@ -104,6 +114,46 @@ def test_a_plan_is_played_to_its_end_with_the_region_of_each_moment(opened: Any,
     assert regions[1][:8] in opened.locator(".moment").text_content()
     assert opened.locator(".player output").text_content() == f"{saved['t'][-1]:.2f} s"
     assert shown(opened) == pytest.approx(np.rad2deg(saved["q"][-1]), abs=0.06)
+    assert "on all of the planned motion, no collision of the covered pairs" in opened.locator(".claim").text_content()
+
+
+def test_the_robot_and_its_player_stay_in_view_while_the_page_scrolls(opened: Any) -> None:
+    plan(opened, degrees((-0.28, -0.1)), degrees((0.03, -0.1)))
+    play = opened.get_by_role("button", name="Play", exact=True)
+    play.wait_for()
+    canvas = opened.locator(".robot canvas").bounding_box()
+    claim = opened.locator(".claim").bounding_box()
+    assert claim["y"] + claim["height"] <= canvas["y"] < canvas["y"] + canvas["height"] <= play.bounding_box()["y"] < 720
+
+
+def test_only_the_overlaps_that_the_motion_goes_through_are_marked(page: Any, url: str, regions: list[str]) -> None:
+    """All three regions overlap each other. The motion goes from the first to the second and on to the third."""
+    page.route("**/v1/planning/graph*", lambda route: route.fulfill(json=triangle(regions)))
+    page.route("**/v1/planning/plan", lambda route: route.fulfill(json=through(regions)))
+    page.goto(f"{url}/scenes/planar")
+    page.get_by_text("1 component").wait_for()
+    legend = page.locator("section[aria-labelledby=h-graph] p").nth(1)
+    assert "planned" not in legend.text_content()
+    plan(page, "0, 0", "-10, 0")
+    page.locator(".moment", has_text="in region").wait_for()
+    assert page.locator(".edge").count() == 3
+    assert page.locator(".edge.planned").count() == 2
+    assert "A blue edge: the planned motion goes through it." in legend.text_content()
+    page.locator(".parts li.map", has_text="in proved cells of the map").wait_for()
+
+
+def triangle(regions: list[str]) -> dict[str, Any]:
+    nodes = [{"region": region, "component": 0} for region in regions]
+    edges = [{"a": a, "b": b, "depth": 0.1, "q": [0.0, 0.0]} for a, b in itertools.combinations(regions, 2)]
+    return {"scene": "", "version": 0, "complete": True, "components": 1, "nodes": nodes, "edges": edges, "gaps": []}
+
+
+def through(regions: list[str]) -> dict[str, Any]:
+    """A motion through three regions, and through the cells of a map."""
+    proved = [{"region": region, "map": None} for region in regions] + [{"region": None, "map": "a map"}]
+    pieces = [{"begin": i, "end": i + 1, "motion": None, "guarantee": "exact", **one} for i, one in enumerate(proved)]
+    motion = {"found": True, "q": [[0, 0], [-0.1, 0]], "t": [0, 4], "pieces": pieces, "length": 0.1, "duration": 4.0, "guarantee": "exact"}
+    return NO_MOTION | {"reason": None} | motion
 
 
 @pytest.mark.parametrize(
@@ -151,7 +201,7 @@ def shown(page: Any) -> list[float]:
 def test_a_link_is_dragged_and_the_rest_of_the_view_turns(page: Any, url: str, planar: Scene) -> None:
     page.goto(f"{url}/scenes/planar")
     canvas = page.locator(".robot canvas")
-    page.locator(".said", has_text="Free here").wait_for()
+    page.locator(".said", has_text="No collision (computed").wait_for()
     box = canvas.bounding_box()
     middle, corner = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2), (box["x"] + 15, box["y"] + box["height"] - 15)
     drag(page, middle, 70)
@@ -159,6 +209,40 @@ def test_a_link_is_dragged_and_the_rest_of_the_view_turns(page: Any, url: str, p
     assert np.abs(there).max() > 5, "the view begins with its middle on the arm"
     drag(page, corner, -70)
     assert shown(page) == there, "no link is there"
+
+
+def test_bodies_are_hidden_and_named_from_a_tree_and_the_view_stands_elsewhere(opened: Any, planar: Scene) -> None:
+    canvas = opened.locator(".robot canvas")
+
+    def looks(*, after: str) -> bytes:
+        """A picture that differs from the last one."""
+        opened.wait_for_timeout(200)
+        seen.append(canvas.screenshot())
+        assert seen[-1] != seen[-2], after
+        return seen[-1]
+
+    seen = [canvas.screenshot()]
+    for view in ("front", "top"):
+        opened.get_by_role("button", name=f"View: {view}").click()
+        looks(after=view)
+    opened.get_by_label("frames").check()
+    looks(after="frames")
+    opened.locator(".view-tools summary").click()
+    tree = opened.locator(".view-tools details")
+    assert {name.strip() for name in tree.locator("label").all_text_contents()} == {*planar.bodies}
+    nested = tree.locator("li", has=opened.get_by_label("arm/link1")).locator("li").get_by_label("arm/link2")
+    assert nested.count() == 1, "the second link hangs on the first"
+    tree.get_by_label("arm/link2").focus()
+    looks(after="pointing at a body")
+    tree.get_by_label("arm/link2").uncheck()
+    looks(after="hiding it")
+    opened.get_by_text("bodies, 1 hidden").wait_for()
+    before = shown(opened)
+    opened.get_by_role("button", name="View: fit").click()
+    looks(after="fit")
+    assert shown(opened) == before
+    tree.get_by_label("arm/link2").check()
+    looks(after="showing it again")
 
 
 def drag(page: Any, at: tuple[float, float], down: float) -> None:
@@ -175,7 +259,7 @@ def test_a_goal_in_collision_is_moved_to_a_free_configuration_near_by(page: Any,
     plan(page, "-20, 10", "22, 15")
     page.get_by_text("arm/link2/bar and world/obstacle touch at the goal").wait_for()
     page.get_by_role("button", name="Use the free configuration near by").press("Enter")
-    page.locator(".said", has_text="Free here").wait_for()
+    page.locator(".said", has_text="No collision (computed").wait_for()
     assert page.get_by_label("To", exact=True).input_value() != "22, 15"
     page.get_by_role("button", name="Plan a motion").press("Enter")
     page.locator(".moment", has_text="in the tube of the proved motion").wait_for()
@@ -303,7 +387,7 @@ def test_a_path_from_a_file_is_certified_and_played(page: Any, url: str, planar:
     said = page.locator(".upload .notice").text_content()
     proved = float(said.split("at least ")[1].split(" mm")[0])
     assert proved <= 1000 * verdict["clearance"] <= 1.02 * proved
-    assert "played as seconds" in page.locator(".upload").text_content()
+    assert "as seconds, from 0 on" in page.locator(".upload").text_content()
     page.get_by_label("speed").select_option("2")
     page.get_by_role("button", name="Play", exact=True).press("Enter")
     page.locator(".player output", has_text="1.50 s").wait_for()
@@ -385,6 +469,8 @@ def test_nothing_keeps_people_out(browser: Any, url: str, regions: list[str], ba
             page.get_by_label("Goal").select_option("arm/link2")
             choose(page, "path.json", json.dumps({"q": FREE}))
             page.get_by_text("Certified.").wait_for()
+            for summary in ("#not-covered summary", ".view-tools summary"):
+                page.locator(summary).click()
         assert barriers(page) == []
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     context.close()

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import io
 import json
+import shlex
+import subprocess
+import sys
 import zipfile
 from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,11 +17,15 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from api.pages.remedies import remedies
+from api.schemas.jobs import Job
 from certifier.model import Scene
 from certifier.options import option
 from db import scenes
 from db.session import Database
+from db.states import JobState
 from jobs.grow import Grow
+from tests.dashboard.test_truth import until
 
 REFUSED = "Failed to load resource: the server responded with a status of "
 EXAMPLE = Path(__file__).parents[2] / "examples" / "planar_2dof"
@@ -26,7 +34,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "planar_2dof"
 @pytest.fixture
 def opened(page: Any, url: str, planar: Scene) -> Any:
     page.goto(f"{url}/new?scene=planar&q=0.1,-0.2")
-    page.get_by_text("Free here").wait_for()
+    page.get_by_text("No collision (computed").wait_for()
     return page
 
 
@@ -79,15 +87,34 @@ def test_what_touches_is_said_live_and_no_job_starts_there(opened: Any, client: 
     opened.get_by_text("no region can hold the configuration").wait_for()
     assert jobs(client) == []
     opened.get_by_role("button", name="Random free one").click()
-    opened.get_by_text("Free here").wait_for()
+    opened.get_by_text("No collision (computed").wait_for()
 
 
 def test_the_address_keeps_the_configuration(opened: Any) -> None:
     set_joint(opened, "arm/joint1", 10)
     opened.wait_for_function("location.search.includes('q=0.1745,-0.2')")
     opened.reload()
-    opened.get_by_text("Free here").wait_for()
+    opened.get_by_text("No collision (computed").wait_for()
     assert opened.get_by_role("spinbutton", name="arm/joint1, degrees, as a number").input_value() == "10.0"
+
+
+def test_the_configuration_of_the_address_is_for_its_scene_only(opened: Any, planar: Scene, database: Database) -> None:
+    """Another scene with as many joints begins at its own q*, and nobody is told of an address that nobody typed."""
+    with database.write() as session:
+        other = replace(planar, name="other", padding=0.001)
+        scenes.add(session, other)
+    opened.reload()
+    opened.get_by_label("Scene", exact=True).select_option(label=f"other · 2 joints, {len(other.pairs)} pairs · {other.hash[:8]}")
+    opened.wait_for_url(f"**/new?scene={other.hash[:16]}&q=0,0")
+    assert opened.get_by_text("The address does not name").count() == 0
+
+
+def test_the_notice_quotes_what_the_address_named(page: Any, url: str, planar: Scene) -> None:
+    page.goto(f"{url}/new?scene=planar&q=0,-9")
+    page.get_by_text("The address does not name a configuration within the limits: 0,-9.").wait_for()
+    page.wait_for_url("**&q=0,-1.2")
+    set_joint(page, "arm/joint1", 5)
+    assert page.get_by_text("within the limits: 0,-9.").count() == 1
 
 
 def test_configurations_are_marked_to_be_connected(opened: Any, url: str, client: TestClient) -> None:
@@ -118,6 +145,153 @@ def test_a_map_is_asked_for(opened: Any, url: str, client: TestClient) -> None:
     (job,) = jobs(client)
     assert job["kind"] == "map"
     assert job["options"] == {"coverage": 0.7, "at": [pytest.approx([0.1, -0.2])], "random_seed": 0, "former": None, "paths": []}
+
+
+def copied(page: Any, form: str) -> str:
+    """The job of the form as a command, as curl, or in Python."""
+    if page.locator("#copies[open]").count() == 0:
+        page.locator("#copies summary").click()
+    page.get_by_role("button", name=form, exact=True).click()
+    return str(page.locator("#copies pre").inner_text())
+
+
+def fill_in(page: Any, kind: str) -> None:
+    """Wishes for a job of a kind, with something that is not the default."""
+    page.get_by_role("radio", name=kind).check()
+    if kind == "Certify a polytope":
+        choose(page, "polytope.json", {"C": [[1.0, 0.0], [-1.0, 0.0]], "d": [0.1, 0.05], "center": [0.02, 0.0]})
+    elif kind == "Certify a motion":
+        choose(page, "motion.json", {"q": [[0.1, -0.2], [-0.1, 0.1]]})
+        page.get_by_label("Clearance").check()
+    else:
+        page.get_by_role("button", name="Add this configuration").click()
+    if kind != "Certify a motion":
+        page.locator("summary", has_text="More options").click()
+        page.get_by_label("Random seed", exact=True).last.fill("7")
+    page.locator("summary", has_text="Deadline").click()
+    page.get_by_label("Deadline").fill("2")
+
+
+def choose(page: Any, name: str, document: dict[str, Any]) -> None:
+    page.locator("#new-file").set_input_files({"name": name, "mimeType": "application/json", "buffer": json.dumps(document).encode()})
+    page.get_by_text(f"{name}: 2 rows of").wait_for()
+
+
+ALL = ["Grow one region", "Cover the scene", "Map the scene", "Certify a polytope", "Certify a motion"]
+
+
+@pytest.mark.parametrize("kind", ALL)
+def test_the_form_the_command_curl_and_python_ask_for_the_same_job(
+    opened: Any, url: str, client: TestClient, kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fill_in(opened, kind)
+    texts = {form: copied(opened, form) for form in ("command", "curl", "Python")}
+    opened.get_by_role("button", name="Start the job").click()
+    opened.wait_for_url(f"{url}/jobs/*")
+    (mine,) = jobs(client)
+    for name, document in (("polytope", mine["options"].get("seed")), ("motion", {"q": mine["options"].get("q")})):
+        (tmp_path / f"{name}.json").write_text(json.dumps(document))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("CIRIS_API_KEY", "")
+    arguments = shlex.split(texts["command"])
+    assert arguments.pop(0) == "ciris"
+    with subprocess.Popen([sys.executable, "-m", "client.cli", *arguments], stderr=subprocess.PIPE) as command:
+        until(lambda: len(jobs(client)) == 2)
+        command.terminate()
+    subprocess.run(["sh", "-c", texts["curl"].replace(' -H "Authorization: Bearer $CIRIS_API_KEY"', "")], check=True, capture_output=True)
+    exec(texts["Python"].replace(".wait()", ""), {})
+    others = jobs(client)[:3]
+    assert len(jobs(client)) == 4
+    same = ("kind", "scene", "options", "priority")
+    for other in others:
+        assert [other[name] for name in same] == [mine[name] for name in same]
+        assert lasts(other) == pytest.approx(lasts(mine)) == 120
+
+
+def test_the_text_is_copied(opened: Any) -> None:
+    opened.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    text = copied(opened, "curl")
+    opened.get_by_role("button", name="Copy", exact=True).click()
+    opened.get_by_role("button", name="Copied").wait_for()
+    assert opened.evaluate("navigator.clipboard.readText()") == text
+
+
+def lasts(job: dict[str, Any]) -> float:
+    """The seconds that a job has from its creation to its deadline."""
+    return (datetime.fromisoformat(job["deadline_at"]) - datetime.fromisoformat(job["created_at"])).total_seconds()
+
+
+@pytest.mark.parametrize("kind", ALL)
+def test_a_job_is_edited_and_run_again(opened: Any, url: str, client: TestClient, kind: str) -> None:
+    """The form of a job that has ended is filled in with all that it was asked for: unchanged, it asks for the same again."""
+    fill_in(opened, kind)
+    opened.get_by_role("button", name="Start the job").click()
+    opened.wait_for_url(f"{url}/jobs/*")
+    opened.get_by_role("button", name="Cancel").click()
+    opened.get_by_role("link", name="Edit and run again").click()
+    opened.locator(".slider").first.wait_for()
+    opened.get_by_role("button", name="Start the job").click()
+    opened.wait_for_url(f"{url}/jobs/*")
+    again, first = jobs(client)
+    assert {**again["options"], "seed": rounded(again)} == {**first["options"], "seed": rounded(first)}
+    assert (again["kind"], lasts(again)) == (first["kind"], lasts(first))
+
+
+def rounded(job: dict[str, Any]) -> Any:
+    return json.loads(json.dumps(job["options"].get("seed")), parse_float=lambda text: round(float(text), 4))
+
+
+def test_a_region_is_certified_again_in_another_scene(page: Any, url: str, planar_region: str, client: TestClient) -> None:
+    page.goto(f"{url}/regions/{planar_region}")
+    page.get_by_role("link", name="Certify it again in another scene").click()
+    page.locator(".slider").first.wait_for()
+    assert page.get_by_label("Region", exact=True).input_value() == planar_region
+    page.get_by_role("button", name="Start the job").click()
+    page.wait_for_url(f"{url}/jobs/*")
+    assert jobs(client)[0]["kind"] == "recertify"
+    assert jobs(client)[0]["options"]["seed"]["region"] == planar_region
+
+
+def test_what_a_kind_of_job_needs_is_asked_for(opened: Any, client: TestClient) -> None:
+    for kind, words in (
+        ("Certify a polytope", "Choose the file with the polytope."),
+        ("Certify a motion", "Choose the file with the motion, or add at least two waypoints."),
+        ("Certify a region again", "Name the region to certify again."),
+    ):
+        opened.get_by_role("radio", name=kind).check()
+        opened.get_by_role("button", name="Start the job").click()
+        opened.get_by_text(words).wait_for()
+    assert jobs(client) == []
+    opened.get_by_role("radio", name="Certify a polytope").check()
+    opened.locator("#new-file").set_input_files({"name": "bad.json", "mimeType": "application/json", "buffer": b"[]"})
+    opened.get_by_text("bad.json cannot be used. It must be an object with C and d.").wait_for()
+
+
+@pytest.mark.parametrize(
+    ("ends", "text", "query"),
+    [
+        ({"reason": "the deadline was reached", "deadline_at": 90.0}, "Allow twice the time", "minutes=3"),
+        ({"error": {"code": "seed_in_collision", "message": "they overlap", "field": "seed.q", "hint": ""}}, "Move the configuration", ""),
+        ({"kind": "certify", "outcome": "inconclusive", "options": {"cells": 1, "seed": {}}}, "Cut it into cells", "cells=200"),
+    ],
+)
+def test_a_failure_offers_its_remedy(client: TestClient, planar: Scene, ends: dict[str, Any], text: str, query: str) -> None:
+    body = {"kind": "grow", "scene": "planar", "seed": {"q": [0.1, -0.2]}}
+    job = Job.model_validate(client.post("/v1/jobs", json=body).json())
+    if "deadline_at" in ends:
+        ends = {**ends, "deadline_at": job.created_at + timedelta(seconds=ends["deadline_at"])}
+    assert remedies(job) == [], "it has not ended"
+    ended = job.model_copy(update={"ended": True, "state": JobState.FAILED, **ends})
+    first, last = remedies(ended)
+    assert first == (text, f"from={job.id}{'&' * bool(query)}{query}")
+    assert last == ("Edit and run again", f"from={job.id}")
+
+
+def test_the_robot_moves_to_a_free_configuration_near_by(opened: Any) -> None:
+    set_joint(opened, "arm/joint1", 22)
+    set_joint(opened, "arm/joint2", 15)
+    opened.get_by_role("button", name="Free one near by").click()
+    opened.get_by_text("No collision (computed").wait_for()
 
 
 def test_what_the_service_refuses_is_said_and_nothing_is_lost(opened: Any, client: TestClient, complaints: list[str]) -> None:
@@ -177,13 +351,13 @@ class Outer:
 def test_an_option_of_each_kind_gets_into_the_request(page: Any, url: str, planar: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Grow, "forms", {"seed": ("Seed", Inner), "options": ("Ways", Outer)})
     page.goto(f"{url}/new?scene=planar&q=0.1,-0.2")
-    page.get_by_text("Free here").wait_for()
+    page.get_by_text("No collision (computed").wait_for()
     for summary in page.locator("summary").all():
         summary.click()
     ways = page.get_by_role("group", name="Ways")
 
     def asked() -> dict[str, Any]:
-        return json.loads(page.locator("pre").inner_text())
+        return json.loads(copied(page, "curl").rpartition("-d '")[2].removesuffix("'"))
 
     assert asked() == {"kind": "grow", "scene": planar.hash[:16], "seed": {"q": [0.1, -0.2]}}, "defaults are not sent"
     assert ways.get_by_label("Centre").count() == ways.get_by_label("Depth").count() == 0
@@ -209,7 +383,7 @@ def test_an_option_of_each_kind_gets_into_the_request(page: Any, url: str, plana
 def test_what_is_wrong_with_an_option_is_said_at_its_field(opened: Any, client: TestClient, complaints: list[str]) -> None:
     more = opened.locator("details", has_text="More options")
     more.locator("summary").click()
-    cells, tolerance = opened.get_by_label("Cells"), opened.get_by_role("group", name="First polytope").get_by_label("Tolerance")
+    cells, tolerance = opened.get_by_label("Cells"), opened.get_by_role("group", name="Starting region").get_by_label("Tolerance")
     cells.fill("0")
     more.locator("summary").click()
     opened.get_by_role("button", name="Start the job").click()
@@ -229,10 +403,11 @@ def test_nothing_keeps_people_out(browser: Any, url: str, planar: Scene, barrier
     context = browser.new_context(viewport={"width": 390, "height": 844}, color_scheme=scheme)
     page = context.new_page()
     page.goto(f"{url}/new?scene=planar")
-    page.get_by_text("Free here").wait_for()
-    for choice in ("Grow one region", "Cover the scene"):
-        page.get_by_text(choice).click()
-        page.get_by_role("button", name="Add this configuration").click()
+    page.get_by_text("No collision (computed").wait_for()
+    for choice in (*ALL, "Certify a region again"):
+        page.get_by_role("radio", name=choice).check()
+        if (add := page.get_by_role("button", name="Add this configuration")).count():
+            add.click()
         for summary in page.locator("summary").all():
             if summary.evaluate("element => !element.parentElement.open"):
                 summary.click()

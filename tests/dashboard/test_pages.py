@@ -17,10 +17,11 @@ from api.schemas.scenes import PairInfo
 from certifier.jobs.region import Region
 from certifier.model import Scene
 from certifier.outcome import Outcome
-from db import jobs, pairs, regions, scenes
+from certifier.verify.decimals import at_least_mm
+from db import jobs, pairs, regions, scenes, steps
 from db.pairs import NewPair
 from db.session import Database
-from db.states import IterationState, PairState
+from db.states import IterationState, JobState, PairState, StepState
 from tests.db.builders import add_iteration
 from tests.db.builders import certified as certified_pair
 from tests.scenes import slider
@@ -55,6 +56,35 @@ def test_every_page_works_offline_and_under_a_strict_policy(client: TestClient, 
 
 def test_the_pages_are_no_part_of_the_api(client: TestClient, paths: list[str]) -> None:
     assert all(path.startswith(("/v1/", "/healthz", "/readyz", "/metrics")) for path in client.get("/openapi.json").json()["paths"])
+
+
+def motion_job(database: Database, scene: Scene, verdict: dict[str, object]) -> str:
+    with database.write() as session:
+        job, _ = jobs.create(session, kind="certify-path", scene_id=scene.hash[:16], options={"q": [[0.0], [0.1]]})
+        jobs.start(session, job)
+        steps.add(session, job, "motion", {})
+        claim = steps.claim(session, job, accepts=False, lease_seconds=60)
+        assert claim is not None
+        steps.save(session, claim, StepState.DONE, verdict, 0.1)
+        jobs.finish(session, job, JobState.SUCCEEDED, outcome=str(verdict["outcome"]), reason="as it is")
+        return job.id
+
+
+def test_the_page_of_a_motion_says_what_is_proved_and_what_is_not(client: TestClient, database: Database, scene: Scene) -> None:
+    begun = {"piece": 0, "time": 0.25, "q": [0.0]}
+    whole = {"outcome": "certified", "stop": None, "certified_to": begun, "proved_distance": 0.01, "clearance": 0.02, "tube": None}
+    touching = {"a": "model/cart/ball", "b": "world/post0", "distance": 2e-9, "piece": 0, "time": 0.25, "q": [0.0]}
+    said = {
+        "all along the motion, the bodies of each covered pair stay apart": whole,
+        "up to 25.0 % of piece 0": whole | {"outcome": "refuted", "stop": touching, "clearance": None},
+        "Nothing is proved of this motion": whole | {"outcome": "refuted", "stop": touching, "certified_to": None, "proved_distance": None},
+    }
+    for words, verdict in said.items():
+        text = client.get(f"/jobs/{motion_job(database, scene, verdict)}").text
+        claim = text.partition('<section class="claim')[2].partition("</section>")[0]
+        assert words in claim
+        assert (f"at least {at_least_mm(0.02)}" in claim) == (verdict["clearance"] is not None)
+        assert f"<dd>{2 if verdict['certified_to'] else 0}</dd>" in claim
 
 
 def test_names_are_escaped(client: TestClient, database: Database) -> None:
@@ -97,13 +127,9 @@ def test_the_page_of_a_region_that_was_stored_before_there_were_shares(client: T
         row.manifest = {name: value for name, value in row.manifest.items() if name not in ("share", "joint_ranges")}
         row.summary = {**row.summary, "share": None}
     text = client.get(f"/regions/{region}").text
-    assert "<dt>Share of proposal</dt><dd>\N{EN DASH}</dd>" in text
+    assert "<dt>Kept of the starting region</dt><dd>\N{EN DASH}</dd>" in text
     assert "samples" not in text
     assert client.get("/v1/regions").json()["regions"][0]["share"] is None
-
-
-def test_an_empty_service_says_how_to_begin(client: TestClient) -> None:
-    assert "ciris grow" in client.get("/").text
 
 
 NOW = datetime(2026, 1, 1, tzinfo=UTC)

@@ -10,6 +10,8 @@ from fastapi.testclient import TestClient
 
 from certifier.model import Array, Scene
 from certifier.pair.collisions import in_collision
+from certifier.verify.decimals import at_least_mm
+from tests.dashboard.test_truth import until
 
 READY = "The robot is inside the region"
 
@@ -48,14 +50,20 @@ def test_sliders_stay_inside_the_region(opened: Any, planar: Scene, faces: tuple
     assert (d - C @ planar.to_s(shown(opened))).min() > -2e-3
 
 
-def test_what_is_not_covered_stands_beside_the_claim(opened: Any, client: TestClient, url: str, planar_region: str) -> None:
-    """One pair of links has no proof: the page says so where it says what is proved, and names the pair."""
-    summary = "1 pair of neighbouring links is not covered"
-    status = opened.locator(".explore [role=status]").text_content()
-    assert status == f"The robot is inside the region: no collision of the 2 pairs below, as proved. {summary}."
-    claim, besides = opened.locator("p.lead").bounding_box(), opened.locator("#not-covered").bounding_box()
-    assert 0 <= besides["y"] - (claim["y"] + claim["height"]) < 40
+def test_the_claim_stays_in_view_and_names_what_it_does_not_cover(opened: Any, client: TestClient, url: str, planar_region: str) -> None:
+    """One box says what is proved, of how many pairs, not of which, how far they are apart, and when and by what it was verified."""
     region = client.get(f"/v1/regions/{planar_region}").json()
+    claim, summary = opened.locator(".claim"), "1 pair of neighbouring links is not covered: arm/link1 \N{EN DASH} arm/link2"
+    assert "in every configuration of this region, the bodies of each covered pair stay apart" in claim.text_content()
+    assert claim.get_by_role("status").text_content() == "The robot is inside the region: no collision of the 2 covered pairs, as proved."
+    facts = claim.locator("dd").all_text_contents()
+    least = min(pair["margin"] for pair in region["manifest"]["pairs"])
+    assert (facts[0], facts[1]) == ("2", f"at least {at_least_mm(least)}")
+    assert facts[2].endswith("in exact arithmetic")
+    opened.get_by_role("heading", name="Pairs").scroll_into_view_if_needed()
+    opened.mouse.wheel(0, 4000)
+    until(lambda: opened.evaluate("scrollY") > 300)
+    assert claim.bounding_box()["y"] == pytest.approx(0, abs=1)
     for path in (f"regions/{planar_region}", f"scenes/{region['scene']}", f"jobs/{region['job']}"):
         opened.goto(f"{url}/{path}")
         folded = opened.locator("#not-covered")
@@ -67,10 +75,19 @@ def test_what_is_not_covered_stands_beside_the_claim(opened: Any, client: TestCl
         assert row.inner_text().split("\t") == ["arm/link1 \N{EN DASH} arm/link2", "1", "neighbours"]
 
 
+def test_what_is_proved_and_what_is_computed_have_two_looks(opened: Any) -> None:
+    def look(selector: str) -> tuple[str, str]:
+        script = "element => [getComputedStyle(element, '::before').content[1], getComputedStyle(element).textDecorationStyle]"
+        return tuple(opened.locator(selector).first.evaluate(script))  # type: ignore[return-value]
+
+    assert look(".claim .proved") == look("td .proved") == look(".key-map .proved") == ("\N{CHECK MARK}", "solid")
+    assert look(".facts .computed") == look(".key-map .computed") == ("\N{ALMOST EQUAL TO}", "dashed")
+
+
 def test_buttons_lead_to_the_ends_of_a_joint(opened: Any, client: TestClient, planar_region: str) -> None:
     ends = client.get(f"/v1/regions/{planar_region}/configurations?samples=0").json()["extremes"]
     for extreme in ends:
-        for word, end in (("least", "lower"), ("greatest", "upper")):
+        for word, end in (("min", "lower"), ("max", "upper")):
             opened.get_by_role("button", name=f"{extreme['joint']} {word}").click()
             assert shown(opened) == pytest.approx(extreme[end], abs=1e-3)
 

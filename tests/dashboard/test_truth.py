@@ -30,7 +30,7 @@ def until(holds: Callable[[], bool]) -> None:
 def test_nothing_is_said_of_a_configuration_that_was_not_asked_about(page: Any, url: str, planar: Scene) -> None:
     """The robot moves into a collision while the service is slow: what was true of the configuration before is not said any more."""
     page.goto(f"{url}/new?scene=planar&q=0,0")
-    page.get_by_text("Free here").wait_for()
+    page.get_by_text("No collision (computed").wait_for()
     held: list[Any] = []
     slow = [True]
     page.route("**/v1/planning/contacts", lambda route: held.append(route) if slow else route.continue_())
@@ -112,7 +112,7 @@ def test_a_configuration_of_which_nothing_is_known_is_not_said_to_be_free(page: 
     page.route("**/v1/planning/contacts", lambda route: route.fulfill(json=answer))
     page.goto(f"{url}/new?scene=planar&q=0.1,-0.2")
     page.get_by_text("Not known here: a joint is half a turn away from q*.").wait_for()
-    assert page.get_by_text("Free here").count() == 0
+    assert page.get_by_text("No collision (computed").count() == 0
 
 
 def test_whoever_signs_in_again_comes_back_to_the_same_place(browser: Any, url: str, database: Database, planar: Scene) -> None:

@@ -58,6 +58,21 @@ def test_only_those_who_run_the_service_have_buttons(client: TestClient, busy: s
     assert buttons == [True, False, False]
 
 
+def test_the_last_worker_is_not_drained_without_a_question_while_it_is_paused(page: Any, url: str, database: Database) -> None:
+    """The only solve worker is paused, so none takes work. Draining it ends it for good all the same."""
+    with database.write() as session:
+        made = Made("host:solve:1", WorkerKind.SOLVE, "1.2", 4, 8, 2**34)
+        workers.tell(session, made, WorkerState.PAUSED)
+        workers.ask(session, workers.page(session).rows[0].id, WorkerState.PAUSED)
+    page.goto(f"{url}/workers")
+    asked: list[str] = []
+    page.on("dialog", lambda dialog: (asked.append(dialog.message), dialog.dismiss()))
+    page.get_by_role("button", name="Drain").click()
+    assert [text.partition(".")[0] for text in asked] == ["This is the last solve worker"]
+    with database.read() as session:
+        assert workers.page(session).rows[0].wanted == "paused"
+
+
 def test_the_page_says_which_worker_is_missing(client: TestClient, database: Database) -> None:
     def notices() -> list[str]:
         return re.findall("<strong>(.*?)</strong>", client.get("/workers/live").text)

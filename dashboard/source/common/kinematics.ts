@@ -83,13 +83,6 @@ export function poseAt(model: SceneModel, body: string, q: number[]): { position
   return { position: [x, y, z], rpy: [roll, Math.atan2(-g, level), yaw] };
 }
 
-const DEGREE = Math.PI / 180;
-
-/** A joint position as people read it: degrees or metres. */
-export function shown(value: number, unit: "rad" | "m"): string {
-  return unit === "rad" ? `${(value / DEGREE).toFixed(1)}°` : `${value.toFixed(3)} m`;
-}
-
 /** The joint's name without its model's, where that is the same for all. */
 export function shortNames(names: string[]): string[] {
   const models = new Set(names.map((name) => name.slice(0, name.lastIndexOf("/") + 1)));
@@ -100,11 +93,6 @@ export function shortNames(names: string[]): string[] {
 export function positions(model: SceneModel): string[] {
   const moving = model.joints.filter((joint) => joint.index !== null && !joint.follows);
   return moving.sort((a, b) => a.index! - b.index!).map((joint) => joint.name);
-}
-
-/** A configuration in degrees and metres, for people. */
-export function asText(q: number[], units: ("rad" | "m")[]): string {
-  return q.map((value, i) => (units[i] === "rad" ? ((value * 180) / Math.PI).toFixed(1) : value.toFixed(3))).join(", ");
 }
 
 /** Whether a geometry stands for a condition of the scene. */

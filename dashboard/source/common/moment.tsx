@@ -84,15 +84,15 @@ export function MomentText({ moment }: { moment: Moment }) {
   return (
     <p class="said" role="status">
       {problem ? <span class="bad">{problem}</span> : pairs === undefined ? "…" : trouble.length ? (
-        <span class="bad">Not free: {trouble.slice(0, 3).join("; ")}{trouble.length > 3 && `; and ${trouble.length - 3} more`}.</span>
+        <span class="bad computed">Not free: {trouble.slice(0, 3).join("; ")}{trouble.length > 3 && `; and ${trouble.length - 3} more`}.</span>
       ) : pairs === null ? "Not known here: a joint is half a turn away from q*." : regions.length ? (
-        <span class="good">In {regions.length === 1 ? "a certified region" : `${regions.length} certified regions`}: {regions.slice(0, 4).map((region, i) => <>{i > 0 && ", "}<a href={`/regions/${region}`} key={region}>{region.slice(0, 8)}</a></>)}. No collision of the scene's pairs, as proved.</span>
+        <span class="proved">In {regions.length === 1 ? "a certified region" : `${regions.length} certified regions`}: {regions.slice(0, 4).map((region, i) => <>{i > 0 && ", "}<a href={`/regions/${region}`} key={region}>{region.slice(0, 8)}</a></>)}. No collision of the scene's pairs, as proved.</span>
       ) : motions.length ? (
-        <span class="good">In the tube of the proved motion {motions[0]!.slice(0, 8)}. No collision of the scene's pairs, as proved.</span>
+        <span class="proved">In the tube of the proved motion {motions[0]!.slice(0, 8)}. No collision of the scene's pairs, as proved.</span>
       ) : map ? (
-        <span class="good">In proved cells of the <a href={`/jobs/${map}`}>map</a>. No collision of the scene's pairs, as proved.</span>
+        <span class="proved">In proved cells of the <a href={`/jobs/${map}`}>map</a>. No collision of the scene's pairs, as proved.</span>
       ) : (
-        <span>Free here, by floating point, and in no certified region{nearest && <>; the nearest is <a href={`/regions/${nearest.region}`}>{nearest.region.slice(0, 8)}</a>, {nearest.distance.toPrecision(3)} away in s</>}.</span>
+        <span><span class="computed">No collision (computed, not proved)</span>, and in no certified region{nearest && <>; the nearest is <a href={`/regions/${nearest.region}`}>{nearest.region.slice(0, 8)}</a>, {nearest.distance.toPrecision(3)} away in s</>}.</span>
       )}
     </p>
   );

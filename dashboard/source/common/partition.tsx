@@ -2,9 +2,9 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import type { Partition } from "./schema";
 import { onScheme } from "./colours";
-import { shown } from "./kinematics";
 import { draw, leafAt, rectangleOf, type Rectangle } from "./treemap";
 import { Tree } from "./tree";
+import { shown } from "./units";
 
 const IN_TABLE = 40;
 const ABOUT = "The table has those that are open, and the largest. Arrow keys go from cell to cell, plus and minus zoom.";

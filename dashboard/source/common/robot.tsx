@@ -46,6 +46,7 @@ export function Robot({ model, q, label, touching = [], ghosts = NONE, onDrag }:
   };
   return (
     <figure class="robot">
+      {!failed && <Tools model={model} view={view} />}
       {failed ? (
         <p class="empty">This browser cannot draw the robot, because WebGL is off.</p>
       ) : (
@@ -53,4 +54,56 @@ export function Robot({ model, q, label, touching = [], ghosts = NONE, onDrag }:
       )}
     </figure>
   );
+}
+
+/** What else the view can do: stand elsewhere, show frames, and leave bodies out. */
+function Tools({ model, view }: { model: SceneModel; view: { current: View | null } }) {
+  const [frames, setFrames] = useState(false);
+  const [hidden, setHidden] = useState<Set<string>>(new Set());
+  useEffect(() => view.current?.setFrames(frames), [model, frames]);
+  useEffect(() => view.current?.setHidden(hidden), [model, hidden]);
+  const show = (body: string, on: boolean): void => setHidden(new Set([...hidden].filter((other) => other !== body).concat(on ? [] : body)));
+  return (
+    <div class="view-tools">
+      {(["front", "top", "fit"] as const).map((from) => <button type="button" key={from} aria-label={`View: ${from}`} onClick={() => view.current?.look(from)}>{from}</button>)}
+      <label><input type="checkbox" checked={frames} onChange={(event) => setFrames(event.currentTarget.checked)} /> frames</label>
+      <details>
+        <summary>bodies{hidden.size > 0 && `, ${hidden.size} hidden`}</summary>
+        <Bodies bodies={roots(model)} model={model} hidden={hidden} onShow={show} onPoint={(body) => view.current?.point(body)} />
+      </details>
+    </div>
+  );
+}
+
+interface Listed {
+  bodies: string[];
+  model: SceneModel;
+  hidden: Set<string>;
+  onShow: (body: string, on: boolean) => void;
+  onPoint: (body: string | null) => void;
+}
+
+/** The tree of bodies, each below the one that carries it. */
+function Bodies({ bodies, ...rest }: Listed) {
+  const { model, hidden, onShow, onPoint } = rest;
+  return (
+    <ul>
+      {bodies.map((body) => {
+        const children = model.joints.filter(({ parent }) => parent === body).map(({ child }) => child);
+        return (
+          <li key={body}>
+            <label onPointerEnter={() => onPoint(body)} onPointerLeave={() => onPoint(null)} onFocusIn={() => onPoint(body)} onFocusOut={() => onPoint(null)}>
+              <input type="checkbox" checked={!hidden.has(body)} onChange={(event) => onShow(body, event.currentTarget.checked)} /> {body}
+            </label>
+            {children.length > 0 && <Bodies {...rest} bodies={children} />}
+          </li>
+        );
+      })}
+    </ul>
+  );
+}
+
+function roots({ bodies, joints }: SceneModel): string[] {
+  const carried = new Set(joints.map(({ child }) => child));
+  return bodies.filter((body) => !carried.has(body));
 }

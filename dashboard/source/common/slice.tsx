@@ -3,9 +3,10 @@ import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { post, said } from "./api";
 import { EMPTY, leavesInSlice, OPEN } from "./cells";
 import { onScheme, token } from "./colours";
-import { shortNames, shown } from "./kinematics";
+import { shortNames } from "./kinematics";
 import { toQ, toS, type Space } from "./polytope";
 import type { Partition, SliceAxis, SliceResponse } from "./schema";
+import { RADIANS, SHOWN, shown } from "./units";
 
 interface Props {
   scene: string;
@@ -134,10 +135,10 @@ export function Slice(props: Props) {
         onPointerMove={onPointer}
       />
       <figcaption>
-        <span class="key-map certified">in a certified region</span> <span class="key-map free">free at the sample</span> <span class="key-map taken">in collision</span>
+        <span class="key-map certified"><span class="proved">in a certified region</span></span> <span class="key-map free"><span class="computed">no collision at the sample</span></span> <span class="key-map taken"><span class="computed">in collision</span></span>
         {cells && <> <span class="key-map cells">cells</span></>}
         <br />
-        {problem ? <strong class="bad">{problem}</strong> : answer && current ? summary(answer) : "Computing …"}
+        {problem ? <strong class="bad">{problem}</strong> : answer && current ? <span class="computed">{summary(answer)}</span> : "Computing …"}
       </figcaption>
     </figure>
   );
@@ -277,9 +278,9 @@ function drawScale(c: CanvasRenderingContext2D, { x, y }: SliceResponse, px: (v:
 }
 
 function ticks({ unit, lower, upper }: SliceAxis): number[] {
-  const scale = unit === "rad" ? Math.PI / 180 : 1;
+  const { scale } = SHOWN[unit];
   const span = (upper - lower) / scale;
-  const steps = unit === "rad" ? [1, 2, 5, 10, 15, 30, 45, 60, 90, 180] : [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5];
+  const steps = unit === "rad" && !RADIANS ? [1, 2, 5, 10, 15, 30, 45, 60, 90, 180] : [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5];
   const step = steps.find((candidate) => span / candidate <= 6) ?? steps.at(-1)!;
   const found: number[] = [];
   for (let value = Math.ceil(lower / scale / step); value * step * scale <= upper; value++) found.push(value * step * scale);
@@ -287,5 +288,6 @@ function ticks({ unit, lower, upper }: SliceAxis): number[] {
 }
 
 function tick(value: number, unit: "rad" | "m"): string {
-  return unit === "rad" ? `${Math.round((value * 180) / Math.PI)}°` : String(Number(value.toPrecision(4)));
+  const text = String(Number((value / SHOWN[unit].scale).toPrecision(4)));
+  return unit === "rad" && !RADIANS ? `${text}°` : text;
 }

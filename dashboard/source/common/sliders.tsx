@@ -1,6 +1,7 @@
-// One slider for each joint, with a field for the number: degrees where the joint turns, metres where it slides.
+// One slider for each joint, with a field for the number: angles where the joint turns, metres where it slides.
 import { useRef, useState } from "preact/hooks";
-import { shortNames, shown } from "./kinematics";
+import { shortNames } from "./kinematics";
+import { SHOWN, shown } from "./units";
 
 interface Props {
   names: string[];
@@ -16,14 +17,12 @@ interface Props {
   marked?: number[];
 }
 
-const DEGREE = Math.PI / 180;
-
 export function Sliders({ names, units, lower, upper, q, onChange, allowed, marked = [] }: Props) {
   const short = shortNames(names);
   const latest = useRef(q);
   latest.current = q;
   const set = (index: number, text: string): void => {
-    const value = Number(text) * (units[index] === "rad" ? DEGREE : 1);
+    const value = Number(text) * SHOWN[units[index]!].scale;
     if (text === "" || !Number.isFinite(value)) return;
     const [low, high] = allowed?.[index] ?? [lower[index]!, upper[index]!];
     latest.current = latest.current.map((old, i) => (i === index ? Math.min(Math.max(value, low), high) : old));
@@ -32,9 +31,7 @@ export function Sliders({ names, units, lower, upper, q, onChange, allowed, mark
   return (
     <div class="sliders">
       {names.map((name, i) => {
-        const scale = units[i] === "rad" ? DEGREE : 1;
-        const digits = units[i] === "rad" ? 1 : 3;
-        const unit = units[i] === "rad" ? "degrees" : "metres";
+        const { scale, digits, sign, word: unit } = SHOWN[units[i]!];
         const range = { min: lower[i]! / scale, max: upper[i]! / scale, step: "any" };
         return (
           <div class={marked.includes(i) ? "slider marked" : "slider"} key={name} title={allowed && `${name} may be between ${shown(allowed[i]![0], units[i]!)} and ${shown(allowed[i]![1], units[i]!)}`}>
@@ -44,7 +41,7 @@ export function Sliders({ names, units, lower, upper, q, onChange, allowed, mark
               <input type="range" {...range} value={q[i]! / scale} aria-label={`${name}, ${unit}`} onInput={(event) => set(i, event.currentTarget.value)} />
             </span>
             <NumberField range={range} text={(q[i]! / scale).toFixed(digits)} label={`${name}, ${unit}, as a number`} onEnter={(text) => set(i, text)} />
-            <span class="unit" aria-hidden="true">{units[i] === "rad" ? "°" : "m"}</span>
+            <span class="unit" aria-hidden="true">{sign.trim()}</span>
           </div>
         );
       })}

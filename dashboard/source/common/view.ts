@@ -13,6 +13,9 @@ const MOST_GHOSTS = 300;
 const TURN = 0.12; // radians a key press
 const ZOOM = 1.15;
 
+/** From where the view looks, in the world; null for where it looks from now. */
+const DIRECTIONS = { front: [0, -1, 0], top: [0, -1e-3, 1], fit: null } as { front: [number, number, number]; top: [number, number, number]; fit: null };
+
 function toVectors(rows: number[][]): three.Vector3[] {
   return rows.map((row) => new three.Vector3(...(row as [number, number, number])));
 }
@@ -69,6 +72,10 @@ export class View {
   private home = { position: new three.Vector3(), target: new three.Vector3() };
   private asked = 0;
   private touching: number[] = [];
+  private hidden = new Set<string>();
+  /** The body that somebody points at, in the list of bodies. */
+  private pointed: string | null = null;
+  private axes: Map<string, three.AxesHelper> | null = null;
   private q: number[];
 
   /** Throws where the browser cannot draw with WebGL. */
@@ -127,6 +134,56 @@ export class View {
     return grid;
   }
 
+  /** Looks at all bodies in view from a direction of the world, or from the present one, from as far as they need. */
+  look(from: keyof typeof DIRECTIONS): void {
+    const box = new three.Box3();
+    for (const { mesh } of this.drawn) if (mesh.visible) box.expandByObject(mesh);
+    if (box.isEmpty()) return;
+    const sphere = box.getBoundingSphere(new three.Sphere());
+    const direction = DIRECTIONS[from] ? new three.Vector3(...DIRECTIONS[from]) : this.camera.position.clone().sub(this.controls.target);
+    const half = (this.camera.fov * Math.PI) / 360;
+    const distance = sphere.radius / Math.sin(Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect)));
+    this.controls.target.copy(sphere.center);
+    this.camera.position.copy(sphere.center).addScaledVector(direction.normalize(), distance);
+    this.camera.far = Math.max(this.camera.far, 4 * distance);
+    this.camera.updateProjectionMatrix();
+    this.controls.update();
+    this.draw();
+  }
+
+  /** Leaves the geometries of these bodies out. */
+  setHidden(bodies: Set<string>): void {
+    this.hidden = bodies;
+    for (const { geometry, mesh } of this.drawn) mesh.visible = !bodies.has(geometry.body);
+    for (const ghost of this.ghosts) ghost.visible = !bodies.has(ghost.name);
+    this.draw();
+  }
+
+  /** Lights a body up; none for null. */
+  point(body: string | null): void {
+    this.pointed = body;
+    this.colour(this.touching);
+  }
+
+  /** Draws the frames of the bodies: x red, y green, z blue. */
+  setFrames(on: boolean): void {
+    for (const axes of this.axes?.values() ?? []) {
+      this.scene.remove(axes);
+      axes.dispose();
+    }
+    this.axes = null;
+    if (on) {
+      this.axes = new Map(this.model.bodies.map((body) => [body, new three.AxesHelper(0.25 * this.reach)]));
+      for (const axes of this.axes.values()) {
+        axes.matrixAutoUpdate = false;
+        (axes.material as three.Material).depthTest = false;
+        axes.renderOrder = 1;
+        this.scene.add(axes);
+      }
+    }
+    this.setPose(this.q);
+  }
+
   /** Looks from where the view began. */
   reset(): void {
     this.camera.position.copy(this.home.position);
@@ -169,7 +226,7 @@ export class View {
       ray.setFromCamera(new three.Vector2((2 * (event.clientX - left)) / width - 1, 1 - (2 * (event.clientY - top)) / height), this.camera);
       return ray;
     };
-    const [hit] = aim(down).intersectObjects(this.drawn.map(({ mesh }) => mesh));
+    const [hit] = aim(down).intersectObjects(this.drawn.map(({ mesh }) => mesh).filter(({ visible }) => visible));
     const link = this.drawn.find(({ mesh, colour }) => colour !== null && mesh === hit?.object);
     if (!hit || !link) return;
     down.stopImmediatePropagation();
@@ -192,6 +249,10 @@ export class View {
       mesh.matrix.copy(toMatrix4(found.get(geometry.body)!));
       mesh.matrixWorldNeedsUpdate = true;
     }
+    for (const [body, axes] of this.axes ?? []) {
+      axes.matrix.copy(toMatrix4(found.get(body)!));
+      axes.matrixWorldNeedsUpdate = true;
+    }
     this.limits?.setPose(found);
     this.draw();
   }
@@ -200,10 +261,11 @@ export class View {
   colour(touching: number[]): void {
     this.touching = touching;
     const are = new Set(touching);
-    this.drawn.forEach(({ mesh, colour }, i) => {
+    this.drawn.forEach(({ geometry, mesh, colour }, i) => {
+      const lit = are.has(i) ? CONTACT : geometry.body === this.pointed ? token("--ink") : null;
       mesh.material.color.set(are.has(i) ? CONTACT : (colour ?? token("--rest")));
-      mesh.material.emissive.set(are.has(i) ? CONTACT : "#000000");
-      mesh.material.emissiveIntensity = are.has(i) ? 0.35 : 0;
+      mesh.material.emissive.set(lit ?? "#000000");
+      mesh.material.emissiveIntensity = lit ? 0.35 : 0;
     });
     const names = touching.map((i) => this.model.geometries[i]!.name).filter(ofCondition);
     this.limits?.colour(new Set(names.map((name) => name.split("/")[1]!)), token("--good"), CONTACT);
@@ -221,6 +283,8 @@ export class View {
     this.ghosts = all.length === 0 ? [] : this.drawn.filter(({ colour }) => colour !== null).map(({ geometry, mesh, colour }) => {
       const material = new three.MeshStandardMaterial({ color: colour!, transparent: true, opacity: GHOST_OPACITY, depthWrite: false });
       const ghost = new three.InstancedMesh(mesh.geometry, material, all.length);
+      ghost.name = geometry.body;
+      ghost.visible = !this.hidden.has(geometry.body);
       all.forEach((found, i) => ghost.setMatrixAt(i, toMatrix4(found.get(geometry.body)!)));
       this.scene.add(ghost);
       return ghost;
@@ -251,6 +315,7 @@ export class View {
     this.observer.disconnect();
     this.forgetScheme();
     this.setGhosts([]);
+    this.setFrames(false);
     cancelAnimationFrame(this.asked);
     this.controls.dispose();
     this.grid.dispose();

@@ -1,9 +1,10 @@
 // A configuration at which a pair touches, or is nearest, in 3D.
 import type { ComponentType } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
-import { positions, shortNames, shown } from "../common/kinematics";
+import { positions, shortNames } from "../common/kinematics";
 import type { SceneModel } from "../common/schema";
 import type { Drawable } from "./store";
+import { shown } from "../common/units";
 
 interface Props {
   /** The pair's index in the scene, and its bodies. */

@@ -1,4 +1,4 @@
-// How much of the proposal the certified region keeps, over time.
+// How much of the starting region the certified region keeps, over time.
 import type { GrowthPoint } from "../common/schema";
 import { duration } from "./outcomes";
 
@@ -28,15 +28,15 @@ export function Growth({ points }: { points: GrowthPoint[] }) {
   const last = known.at(-1)!;
   return (
     <section aria-labelledby="h-share">
-      <h2 id="h-share">Share kept over time</h2>
+      <h2 id="h-share">Kept of the starting region, over time</h2>
       {known.length > 1 && <Curve known={known} />}
       <p class="small">
-        {percent(last.share)} of the proposal is certified after {duration(last.seconds)}. Shares are estimated from samples; each region is
+        {percent(last.share)} of the starting region is certified after {duration(last.seconds)}. Shares are estimated from samples; each region is
         certified by its own proof.
       </p>
       <details id="share-table">
         <summary>As a table</summary>
-        <div class="scroll" tabIndex={0} role="region" aria-label="Share kept over time">
+        <div class="scroll" tabIndex={0} role="region" aria-label="Kept of the starting region, over time">
           <table>
             <thead>
               <tr>
@@ -80,7 +80,7 @@ function Curve({ known }: { known: Known[] }) {
         class="chart"
         viewBox={`0 0 ${WIDTH} ${HEIGHT}`}
         role="img"
-        aria-label="Share of the proposal that is certified, over time. The table below has the numbers."
+        aria-label="Share of the starting region that is certified, over time. The table below has the numbers."
       >
         {parts.map((part) => (
           <g key={part}>

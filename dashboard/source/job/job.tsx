@@ -1,7 +1,9 @@
-// The page of a job, below its head: the matrix of pairs or one of them, what holds the region back, how it grew, and who works on it.
+// The page of a job, below its head: the matrix of pairs or one of them, what limits the region, how it grew, and who works on it.
+import type { ComponentType } from "preact";
 import { useEffect, useMemo, useReducer, useState } from "preact/hooks";
 import { get, said } from "../common/api";
 import type { SceneModel } from "../common/schema";
+import type { Unit } from "../common/units";
 import { Growth } from "./growth";
 import { Log } from "./log";
 import { Matrix, Memory } from "./matrix";
@@ -11,10 +13,17 @@ import { useRoute } from "./route";
 import { JobStore, type Drawable } from "./store";
 import { Workers } from "./workers";
 
-export function JobIsland({ job, subject, scene, ended, begun }: { job: string; subject: string; scene: string; ended: boolean; begun: number }) {
+/** The motion of a job, once what draws it is there: three.js is large. */
+function Moved(props: { job: string; scene: string }) {
+  const [Motion, setMotion] = useState<ComponentType<typeof props> | null>(null);
+  useEffect(() => void import("./motion").then((module) => setMotion(() => module.Motion)), []);
+  return Motion && <Motion {...props} />;
+}
+
+export function JobIsland({ job, subject, scene, ended, begun, units }: { job: string; subject: string; scene: string; ended: boolean; begun: number; units: Unit[] }) {
   const [version, changed] = useReducer((count: number) => count + 1, 0);
   const [robot, setRobot] = useState<Drawable>({ model: null, problem: null });
-  const store = useMemo(() => new JobStore(job, ended, begun, () => changed(undefined)), [job]);
+  const store = useMemo(() => new JobStore(job, ended, begun, units, () => changed(undefined)), [job]);
   const memory = useMemo(() => new Memory(), []);
   const route = useRoute();
   useEffect(() => {
@@ -50,6 +59,7 @@ export function JobIsland({ job, subject, scene, ended, begun }: { job: string; 
       ) : (
         <>
           {store.iterations.length > 0 && <Matrix store={store} version={version} memory={memory} />}
+          {store.ended && subject === "the motion" && <Moved job={job} scene={scene} />}
           <Growth points={store.growth} />
           <Obstacles
             obstacles={store.obstacles}

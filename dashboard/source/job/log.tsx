@@ -5,7 +5,7 @@ import { duration, plural } from "./outcomes";
 import type { JobStore } from "./store";
 
 const STEPS: Record<string, string> = {
-  propose: "Looking for a first polytope around the seed",
+  propose: "Looking for a starting region around the seed",
   step: "Moving the faces of the region",
   accept: "Putting the region's proof together and verifying it",
   scout: "Looking at what is covered",
@@ -51,8 +51,9 @@ export function sentence({ kind, data }: Event): string {
   const state = text("state"), number = text("iteration") || text("index");
   switch (kind) {
     case "job": {
-      const outcome = where("outcome", ` with the outcome ${text("outcome")}`);
-      return `The job ${IS[state] ?? state}${outcome}${data.reason === data.outcome ? "" : where("reason", `: ${data.reason}`)}.`;
+      // The reason says more than the outcome, which for a cover or a map is about samples.
+      const why = data.reason && data.reason !== data.outcome ? `: ${data.reason}` : where("outcome", ` with the outcome ${text("outcome")}`);
+      return `The job ${IS[state] ?? state}${why}.`;
     }
     case "iteration": {
       const one = `Iteration ${number} (${text("label")})`;
@@ -70,7 +71,7 @@ export function sentence({ kind, data }: Event): string {
     }
     case "region": {
       const share = (data.share as { value: number | null } | null)?.value;
-      const kept = share == null ? "" : `; it keeps ${(100 * share).toPrecision(3)} % of the proposal, as samples say`;
+      const kept = share == null ? "" : `; it keeps ${(100 * share).toPrecision(3)} % of the starting region, as samples say`;
       return `A region is certified in iteration ${number} (${text("guarantee")})${kept}.`;
     }
     case "note": {

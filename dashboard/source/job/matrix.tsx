@@ -301,6 +301,7 @@ function Grid({ store, version, rows, memory }: { store: JobStore; version: numb
             shownAt.iteration.states[shownAt.pair.index] ?? "-",
             shownAt.iteration,
             store.cell(shownAt.iteration.index, shownAt.pair.index),
+            store.units,
           ).map((fact) => (
             <div key={fact}>{fact}</div>
           ))}
@@ -366,7 +367,7 @@ class Row extends Component<RowProps> {
               aria-colindex={column + 2}
               data-row={row}
               data-column={column}
-              aria-label={column === active ? facts(letter, one, store.cell(one.index, pair.index)).join("; ") : words}
+              aria-label={column === active ? facts(letter, one, store.cell(one.index, pair.index), store.units).join("; ") : words}
               style={{ left: `${named + column * wide}px`, width: `${wide}px` }}
             >
               {glyph}

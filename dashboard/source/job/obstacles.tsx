@@ -1,4 +1,4 @@
-// What holds the region back, in words, and the configuration in contact in 3D.
+// What limits the region, in words, and the configuration in contact in 3D.
 import { useState } from "preact/hooks";
 import type { Obstacle } from "../common/schema";
 import { Contact } from "./contact";
@@ -17,9 +17,9 @@ export function Obstacles({ obstacles, robot, whom }: { obstacles: Obstacle[] | 
   const drawn = obstacles.find((one) => key(one) === chosen) ?? obstacles.find(({ q }) => q !== null);
   return (
     <section aria-labelledby="h-obstacles">
-      <h2 id="h-obstacles">What holds {whom} back</h2>
+      <h2 id="h-obstacles">What limits {whom}</h2>
       {obstacles.length === 0 ? (
-        <p class="empty">Nothing is known to hold it back.</p>
+        <p class="empty">Nothing is known to limit it.</p>
       ) : (
         <div class={drawn?.q ? "stage" : ""}>
           {drawn?.q && <Contact {...drawn} q={drawn.q} robot={robot} />}

@@ -1,5 +1,6 @@
 // What becomes of a pair: the letter of the service, and how people see it. Every outcome has a glyph, so that nobody needs colours.
 import type { IterationStates, PairCell } from "../common/schema";
+import { shown, type Unit } from "../common/units";
 
 export interface Outcome {
   /** The class that ciris.css colours. */
@@ -20,7 +21,7 @@ export const OUTCOMES: Record<string, Outcome> = {
   s: { name: "skipped", glyph: "−", words: "skipped" },
   "-": { name: "absent", glyph: "", words: "not reached" },
   c: { name: "certified", glyph: "✓", words: "certified" },
-  u: { name: "reused", glyph: "↺", words: "certified by an earlier proof" },
+  u: { name: "reused", glyph: "↺", words: "still proved" },
 };
 
 const ORDER = Object.keys(OUTCOMES).join("");
@@ -53,7 +54,7 @@ export function atLeast(metres: number): string {
 }
 
 /** Says of a cell of the matrix all that is known: outcome, how, how long, what distance is proved, and where it fails. */
-export function facts(letter: string, iteration: IterationStates, cell: PairCell | undefined): string[] {
+export function facts(letter: string, iteration: IterationStates, cell: PairCell | undefined, units: Unit[]): string[] {
   const found = [`${OUTCOMES[letter]!.words} in iteration ${iteration.index}`];
   if (!cell) return found;
   if (cell.stage) found.push(`by ${cell.stage.replaceAll("_", " ")}`);
@@ -63,7 +64,7 @@ export function facts(letter: string, iteration: IterationStates, cell: PairCell
   if (cell.open_cells) found.push(plural(cell.open_cells, "open cell"));
   if (cell.worker && letter === "w") found.push(`on ${cell.worker}`);
   if (cell.witness_q)
-    found.push(`${letter === "r" ? "in collision" : "nearest"} at q = ${cell.witness_q.map((value) => value.toPrecision(4)).join(", ")}`);
+    found.push(`${letter === "r" ? "in collision" : "nearest"} at q = ${cell.witness_q.map((value, i) => shown(value, units[i]!)).join(", ")}`);
   if (cell.detail) found.push(cell.detail);
   return found;
 }

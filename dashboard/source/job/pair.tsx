@@ -77,7 +77,7 @@ export function Pair({ store, version, robot, route }: Props) {
       <div class={where ? "stage" : ""}>
         {where && <Contact pair={route.pair} a={pair.a} b={pair.b} q={where} robot={robot} />}
         <div>
-          {iteration && <p class="said">{sentence(facts(letter, iteration, cell).join("; "))}.</p>}
+          {iteration && <p class="said">{sentence(facts(letter, iteration, cell, store.units).join("; "))}.</p>}
           {about && <p class="said">{about.text}</p>}
         </div>
       </div>

@@ -3,6 +3,7 @@
 import { refresh, connected } from "../live";
 import { follow, get, said } from "../common/api";
 import type { Event, EventList, GrowthCurve, GrowthPoint, HeldWork, IterationStates, JobWorkers, Obstacle, Obstacles, PairCell, PairInfo, PairMatrix, PairStates, SceneModel } from "../common/schema";
+import type { Unit } from "../common/units";
 
 /** The robot as it is drawn, once it is there, or why it is not. */
 export interface Drawable {
@@ -58,6 +59,8 @@ export class JobStore {
     public ended: boolean,
     /** How many iterations had begun when the page was made. */
     private readonly begun: number,
+    /** Of the scene's joint positions. */
+    readonly units: Unit[],
     private readonly tell: () => void,
   ) {
     this.path = `/v1/jobs/${job}`;

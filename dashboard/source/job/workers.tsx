@@ -5,7 +5,7 @@ import { address } from "./route";
 import type { JobStore } from "./store";
 
 const WORK: Record<string, string> = {
-  seed: "looks for the first polytope",
+  seed: "looks for the starting region",
   step: "moves the faces of the region",
   accept: "puts the region's proof together and verifies it",
   scout: "looks at what is covered",
@@ -17,9 +17,9 @@ const NAMED = 4;
 export function Workers({ store }: { store: JobStore }) {
   return (
     <section aria-labelledby="h-workers">
-      <h2 id="h-workers">Workers</h2>
+      <h2 id="h-workers">Working on it</h2>
       {store.workers.length === 0 ? (
-        <p class="empty">No process works for the job at this moment.</p>
+        <p class="empty">No process works on the job at this moment.</p>
       ) : (
         <ul class="workers">
           {store.workers.map((worker) => (

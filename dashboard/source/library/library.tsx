@@ -1,15 +1,17 @@
 // A scene and its library of regions: the robot, which regions hold it, how they are connected, slices, and motions.
-import { useEffect, useMemo, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { get, said } from "../common/api";
+import { InClaim } from "../common/claim";
 import { positions } from "../common/kinematics";
 import { MomentText, touchingOf, useMoment } from "../common/moment";
 import type { Space } from "../common/polytope";
 import { Robot } from "../common/robot";
-import type { Approach, GraphResponse, PlanResponse, RegionConfigurations, SceneModel } from "../common/schema";
+import type { Approach, GraphResponse, RegionConfigurations, SceneModel } from "../common/schema";
 import { Slice } from "../common/slice";
 import { Sliders } from "../common/sliders";
 import { coverage, type Coverage } from "./coverage";
 import { Graph } from "./graph";
+import { Player, type Shown } from "./player";
 import { Planning } from "./plan";
 import { Upload } from "./upload";
 
@@ -34,7 +36,8 @@ function Library({ model }: { model: SceneModel }) {
   const [graphProblem, setGraphProblem] = useState<string | null>(null);
   const [covered, setCovered] = useState<Coverage | null>(null);
   const [chosen, setChosen] = useState<string | null>(null);
-  const [plan, setPlan] = useState<PlanResponse | null>(null);
+  const [motion, setMotion] = useState<Shown | null>(null);
+  const stay = useRef<HTMLDivElement>(null);
   const [pair, setPair] = useState<Approach | null>(null);
   const moment = useMoment(model.scene, q);
 
@@ -71,21 +74,24 @@ function Library({ model }: { model: SceneModel }) {
     () => (pair?.q === q ? model.geometries.flatMap(({ name }, i) => (name === pair.a || name === pair.b ? i : [])) : touchingOf(model, moment)),
     [moment, model, pair, q],
   );
-  const planned = useMemo(() => new Set(plan?.pieces.flatMap(({ region }) => region ?? []) ?? []), [plan]);
+  const way = motion?.way ?? [];
+  // On a narrow screen the robot is above what asked for the motion.
+  useEffect(() => {
+    if (motion) stay.current!.firstElementChild!.scrollIntoView();
+  }, [motion]);
   const holding = useMemo(() => new Set(moment.regions), [moment]);
   return (
     <div class="library">
+      <InClaim place="now"><MomentText moment={moment} /></InClaim>
+      <InClaim place="motion">{motion && <p>{motion.claim}</p>}</InClaim>
       <div class="views">
-        <div>
+        <div class="stay" ref={stay}>
           <Robot model={model} q={q} onDrag={setQ} touching={touching} label={`The robot of ${model.name}${pair?.q === q ? `, with ${pair.a} and ${pair.b} painted` : touching.length ? ", not free" : ""}`} />
-          <MomentText moment={moment} />
+          {motion && <Player motion={motion} names={names} units={model.units} onMove={setQ} />}
+          <Sliders names={names} units={model.units} lower={model.q_lower} upper={model.q_upper} q={q} onChange={setQ} />
         </div>
-        <Slice scene={model.scene} space={space} units={model.units} q={q} onPick={setQ} strongest={chosen} way={plan?.found ? plan.q : undefined} />
-      </div>
-      <div class="card">
-        <Sliders names={names} units={model.units} lower={model.q_lower} upper={model.q_upper} q={q} onChange={setQ} />
-      </div>
-      <div class="views">
+        <div>
+          <Slice scene={model.scene} space={space} units={model.units} q={q} onPick={setQ} strongest={chosen} way={motion?.q} />
         <section aria-labelledby="h-graph">
           <h2 id="h-graph">Connected regions</h2>
           {graphProblem && <p class="notice bad">{graphProblem}</p>}
@@ -95,10 +101,10 @@ function Library({ model }: { model: SceneModel }) {
             <>
               <p>
                 <strong>{graph.nodes.length}</strong> {graph.nodes.length === 1 ? "region" : "regions"}, {graph.edges.length} {graph.edges.length === 1 ? "overlap" : "overlaps"}, <strong>{graph.components}</strong> {graph.components === 1 ? "component" : "components"}{!graph.complete && ", so far"}.{" "}
-                {covered && <>They cover <strong>{(100 * covered.value).toFixed(0)} ± {Number((100 * covered.stderr).toPrecision(1))} %</strong> of the free configurations, by a sample of {covered.free}.</>}
+                {covered && <><span class="computed">They cover <strong>{(100 * covered.value).toFixed(0)} ± {Number((100 * covered.stderr).toPrecision(1))} %</strong> of the free configurations</span>, by a sample of {covered.free}.</>}
               </p>
-              <Graph graph={graph} holding={holding} planned={planned} chosen={chosen} onChoose={choose} />
-              <p class="quiet small">Choose a region to go to its centre. Ringed regions hold the configuration.</p>
+              <Graph graph={graph} holding={holding} way={way} chosen={chosen} onChoose={choose} />
+              <p class="quiet small">Choose a region to go to its centre. A ring around a region: it holds the configuration of the robot.{way.some(Boolean) && " A blue edge: the planned motion goes through it."}</p>
               <details>
                 <summary>Overlaps as a table</summary>
                 <div class="scroll tall" tabIndex={0} role="region" aria-label="Overlaps">
@@ -129,14 +135,13 @@ function Library({ model }: { model: SceneModel }) {
             </>
           )}
         </section>
-        <div>
           <section aria-labelledby="h-plan">
             <h2 id="h-plan">Plan a motion</h2>
-            <Planning model={model} names={names} q={q} onMove={setQ} plan={plan} onPlan={setPlan} />
+            <Planning model={model} names={names} q={q} onMove={setQ} onShow={setMotion} />
           </section>
           <section aria-labelledby="h-upload">
             <h2 id="h-upload">Upload a path</h2>
-            <Upload model={model} names={names} onMove={setQ} onPair={showPair} />
+            <Upload model={model} onMove={setQ} onPair={showPair} onShow={setMotion} />
           </section>
         </div>
       </div>

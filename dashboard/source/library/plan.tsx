@@ -1,19 +1,20 @@
 // A motion from a start to a goal: asked for, said why there is none, or played.
-import { useEffect, useMemo, useState } from "preact/hooks";
+import { useMemo, useState } from "preact/hooks";
 import { post, said } from "../common/api";
-import { asText, movingBodies } from "../common/kinematics";
+import { movingBodies } from "../common/kinematics";
 import type { Piece, PlanResponse, SceneModel } from "../common/schema";
-import { Player, type Part } from "./player";
+import type { Part, Shown } from "./player";
 import { asked, PoseFields, typedAt, type Typed } from "./pose";
 import { Why } from "./why";
+import { asText, inWords, shown, typed } from "../common/units";
 
 interface Props {
   model: SceneModel;
   names: string[];
   q: number[];
   onMove: (q: number[]) => void;
-  plan: PlanResponse | null;
-  onPlan: (plan: PlanResponse | null) => void;
+  /** Shows a motion, or takes the one that was shown away. */
+  onShow: (motion: Shown | null) => void;
 }
 
 /** An end of the motion as it is shown, and the configuration that is meant; null where the text is none. */
@@ -22,19 +23,10 @@ interface End {
   q: number[] | null;
 }
 
-type Units = ("rad" | "m")[];
-
-const DEGREE = Math.PI / 180;
 /** How far a frame may be from a straight line. */
-const LINE = { metres: 1e-3, radians: 0.5 * DEGREE };
+const LINE = { metres: 1e-3, radians: (0.5 * Math.PI) / 180 };
 
-/** Reads numbers in degrees and metres; null where they are not one for each joint. */
-function read(text: string, units: Units): number[] | null {
-  const numbers = text.split(/[\s,;]+/).filter(Boolean).map(Number);
-  return numbers.length === units.length && numbers.every(Number.isFinite) ? numbers.map((value, i) => (units[i] === "rad" ? value * DEGREE : value)) : null;
-}
-
-export function Planning({ model, names, q, onMove, plan, onPlan }: Props) {
+export function Planning({ model, names, q, onMove, onShow }: Props) {
   const { units } = model;
   const here = (at: number[]): End => ({ text: asText(at, units), q: at });
   const [ends, setEnds] = useState({ start: here(q), goal: here(q) });
@@ -42,9 +34,14 @@ export function Planning({ model, names, q, onMove, plan, onPlan }: Props) {
   /** The goal where it is the pose of a frame; null where it is a configuration. */
   const [pose, setPose] = useState<Typed | null>(null);
   const [flags, setFlags] = useState({ only: false, straight: false });
+  const [plan, setPlan] = useState<PlanResponse | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
   const [asking, setAsking] = useState(false);
-  const words = units.every((unit) => unit === "rad") ? "degrees" : units.every((unit) => unit === "m") ? "metres" : "degrees and metres";
+  const words = inWords(units);
+  const onPlan = (found: PlanResponse | null): void => {
+    setPlan(found);
+    onShow(found?.found ? shownOf(found) : null);
+  };
   const ask = async (event: Event): Promise<void> => {
     event.preventDefault();
     const [start, goal] = [ends.start.q, ends.goal.q];
@@ -81,7 +78,7 @@ export function Planning({ model, names, q, onMove, plan, onPlan }: Props) {
   const field = (end: "start" | "goal") => (
     <>
       <label for={`plan-${end}`}>{end === "start" ? "From" : "To"}</label>
-      <input id={`plan-${end}`} value={ends[end].text} onInput={({ currentTarget: { value } }) => set(end, { text: value, q: read(value, units) })} aria-describedby="plan-units" spellcheck={false} autocomplete="off" />
+      <input id={`plan-${end}`} value={ends[end].text} onInput={({ currentTarget: { value } }) => set(end, { text: value, q: typed(value, units) })} aria-describedby="plan-units" spellcheck={false} autocomplete="off" />
       <button type="button" onClick={() => set(end, here(q))}>Set as {end}</button>
     </>
   );
@@ -109,32 +106,21 @@ export function Planning({ model, names, q, onMove, plan, onPlan }: Props) {
         {problem && <p class="notice bad">{problem}</p>}
         {plan && !plan.found && <Why plan={plan} names={names} units={units} onUse={use} onLook={onMove} />}
       </div>
-      {plan?.found && <Found plan={plan} names={names} units={units} onMove={onMove} />}
+      {plan?.found && <p class="found"><strong>{plan.duration!.toFixed(2)} s</strong>, {units.includes("m") ? `${plan.length!.toPrecision(3)} long in radians and metres` : `${shown(plan.length!, "rad")} long`}. The robot's view plays it.</p>}
     </div>
   );
 }
 
 /** What proves a piece of the motion, in words. */
-function partOf({ begin, end, region, motion, guarantee }: Piece): Part {
+function partOf({ begin, end, region, map, motion, guarantee }: Piece): Part {
   const worth = <span class={`badge ${guarantee}`}>{guarantee}</span>;
-  return region
-    ? { begin, end, by: "region", said: <>in region <a href={`/regions/${region}`}>{region.slice(0, 8)}</a> {worth}</> }
+  if (region) return { begin, end, by: "region", said: <>in region <a href={`/regions/${region}`}>{region.slice(0, 8)}</a> {worth}</> };
+  return map
+    ? { begin, end, by: "map", said: <>in proved cells of the <a href={`/jobs/${map}`}>map</a> {worth}</> }
     : { begin, end, by: "motion", said: <>in the tube of the proved motion <code>{motion!.slice(0, 8)}</code> {worth}</> };
 }
 
-function Found({ plan, names, units, onMove }: { plan: PlanResponse; names: string[]; units: Units; onMove: (q: number[]) => void }) {
-  const parts = useMemo(() => plan.pieces.map(partOf), [plan]);
-  const file = useMemo(() => URL.createObjectURL(new Blob([JSON.stringify(plan)], { type: "application/json" })), [plan]);
-  useEffect(() => () => URL.revokeObjectURL(file), [file]);
-  return (
-    <>
-      <p class="found">
-        <strong>{plan.duration!.toFixed(2)} s</strong>, {plan.length!.toPrecision(3)} long in q; guarantee <span class={`badge ${plan.guarantee}`}>{plan.guarantee}</span>:
-        every point of it is proved to be free of collision, by what the list below names.
-      </p>
-      <Player motion={plan} parts={parts} names={names} units={units} onMove={onMove}>
-        <a href={file} download="plan.json">Download</a>
-      </Player>
-    </>
-  );
+function shownOf(plan: PlanResponse): Shown {
+  const claim = <><span class="proved">Proved:</span> on all of the planned motion, no collision of the covered pairs, by what its parts name; guarantee {plan.guarantee}.</>;
+  return { q: plan.q, t: plan.t, parts: plan.pieces.map(partOf), way: plan.pieces.map(({ region }) => region), claim, file: plan };
 }

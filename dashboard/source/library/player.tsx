@@ -1,8 +1,9 @@
 // A motion to be played: the robot moves along it, and the page says what proves each part of it.
 import type { ComponentChildren } from "preact";
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { LINKS } from "../common/colours";
-import { shortNames, shown } from "../common/kinematics";
+import { shortNames } from "../common/kinematics";
+import { shown } from "../common/units";
 
 /** A motion, straight in q between its configurations. The first time is 0. */
 export interface Motion {
@@ -14,18 +15,25 @@ export interface Motion {
 export interface Part {
   begin: number;
   end: number;
-  by: "region" | "motion" | "nothing";
+  by: "region" | "map" | "motion" | "nothing";
   said: ComponentChildren;
 }
 
-interface Props {
-  motion: Motion;
+/** A motion to be shown, what proves each part of it, and what is claimed of it. */
+export interface Shown extends Motion {
   parts: Part[];
+  /** The regions that prove it, one for each part; null for a part that something else proves. */
+  way: (string | null)[];
+  claim: ComponentChildren;
+  /** What to download, as JSON; null where the reader has it. */
+  file: object | null;
+}
+
+interface Props {
+  motion: Shown;
   names: string[];
   units: ("rad" | "m")[];
   onMove: (q: number[]) => void;
-  /** What else there is to do, after the controls. */
-  children?: ComponentChildren;
 }
 
 /** The configuration at a time, on the straight line in q between two of the motion's. */
@@ -36,7 +44,8 @@ function at({ q, t }: Motion, time: number): number[] {
   return q[next - 1]!.map((value, i) => value + share * (q[next]![i]! - value));
 }
 
-export function Player({ motion, parts, names, units, onMove, children }: Props) {
+export function Player({ motion, names, units, onMove }: Props) {
+  const { parts } = motion;
   const end = motion.t.at(-1)!;
   const [time, setTime] = useState(0);
   const [playing, setPlaying] = useState(false);
@@ -72,7 +81,7 @@ export function Player({ motion, parts, names, units, onMove, children }: Props)
         <input type="range" min={0} max={end} step="any" value={time} aria-label="Time, seconds" aria-valuetext={`${time.toFixed(2)} s`} onInput={(event) => { setPlaying(false); go(Number(event.currentTarget.value)); }} />
         <output>{time.toFixed(2)} s</output>
         <label>speed <select value={speed} onChange={(event) => setSpeed(Number(event.currentTarget.value))}>{[0.25, 0.5, 1, 2].map((factor) => <option value={factor} key={factor}>{factor}×</option>)}</select></label>
-        {children}
+        {motion.file && <Download file={motion.file} />}
       </div>
       <p class="moment">At {time.toFixed(2)} s: {part.said}</p>
       <Curves motion={motion} parts={parts} names={names} units={units} time={time} />
@@ -83,6 +92,12 @@ export function Player({ motion, parts, names, units, onMove, children }: Props)
       </ol>
     </div>
   );
+}
+
+function Download({ file }: { file: object }) {
+  const address = useMemo(() => URL.createObjectURL(new Blob([JSON.stringify(file)], { type: "application/json" })), [file]);
+  useEffect(() => () => URL.revokeObjectURL(address), [address]);
+  return <a href={address} download="plan.json">Download</a>;
 }
 
 const CHART = { width: 560, height: 140, pad: 6, band: 8 };

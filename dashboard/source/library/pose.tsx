@@ -1,8 +1,9 @@
 // A goal by the pose of a frame: where its origin is in the world, and how it is turned.
 import { poseAt } from "../common/kinematics";
 import type { SceneModel } from "../common/schema";
+import { SHOWN } from "../common/units";
 
-/** A pose as it is typed: x, y, z in metres, and roll, pitch, yaw in degrees. */
+/** A pose as it is typed: x, y, z in metres, and roll, pitch, yaw as angles are shown. */
 export interface Typed {
   frame: string;
   texts: string[];
@@ -15,19 +16,19 @@ interface Props {
   onChange: (pose: Typed) => void;
 }
 
-const DEGREE = Math.PI / 180;
-const FIELDS = [...["x", "y", "z"].map((name) => ({ name, unit: "metres", sign: "m" })), ...["roll", "pitch", "yaw"].map((name) => ({ name, unit: "degrees", sign: "°" }))];
+const { scale, word, sign: ANGLE } = SHOWN.rad;
+const FIELDS = [...["x", "y", "z"].map((name) => ({ name, unit: "metres", sign: "m" })), ...["roll", "pitch", "yaw"].map((name) => ({ name, unit: word, sign: ANGLE }))];
 
 /** The pose of a frame while the robot is at q. It has twelve digits, because a robot with few joints reaches a pose only if it is exact. */
 export function typedAt(model: SceneModel, frame: string, q: number[]): Typed {
   const { position, rpy } = poseAt(model, frame, q);
-  return { frame, texts: [...position, ...rpy.map((angle) => angle / DEGREE)].map((value) => String(Number(value.toFixed(12)))) };
+  return { frame, texts: [...position, ...rpy.map((angle) => angle / scale)].map((value) => String(Number(value.toFixed(12)))) };
 }
 
 /** The pose as the service takes it. */
 export function asked({ frame, texts }: Typed): { frame: string; position: number[]; rpy: number[] } {
   const numbers = texts.map(Number);
-  return { frame, position: numbers.slice(0, 3), rpy: numbers.slice(3).map((angle) => angle * DEGREE) };
+  return { frame, position: numbers.slice(0, 3), rpy: numbers.slice(3).map((angle) => angle * scale) };
 }
 
 export function PoseFields({ model, q, pose, onChange }: Props) {

@@ -1,30 +1,33 @@
 // A path from a file: certified, or shown where bodies first touch on it.
-import { useMemo, useState } from "preact/hooks";
+import { useState } from "preact/hooks";
 import { post, said } from "../common/api";
 import type { Approach, MotionResponse, SceneModel } from "../common/schema";
-import { Player, type Motion, type Part } from "./player";
-import { readPath, type Path } from "./waypoints";
+import type { Motion, Part, Shown } from "./player";
+import { readPath, type Path } from "../common/waypoints";
 
 interface Props {
   model: SceneModel;
-  names: string[];
   onMove: (q: number[]) => void;
   /** Moves the robot to where a pair of bodies is near or touches, and paints the two. */
   onPair: (pair: Approach) => void;
+  onShow: (motion: Shown | null) => void;
 }
+
+type MotionVerdict = Pick<MotionResponse, "certified_to" | "stop" | "clearance" | "proved_distance" | "seconds" | "verify_seconds">;
 
 interface Answered {
   path: Path;
   verdict: MotionResponse;
 }
 
-export function Upload({ model, names, onMove, onPair }: Props) {
+export function Upload({ model, onMove, onPair, onShow }: Props) {
   const [asking, setAsking] = useState<string | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
   const [answered, setAnswered] = useState<Answered | null>(null);
   const ask = async (file: File | undefined): Promise<void> => {
     if (!file) return;
     setAnswered(null);
+    onShow(null);
     setProblem(null);
     setAsking(file.name);
     try {
@@ -33,6 +36,7 @@ export function Upload({ model, names, onMove, onPair }: Props) {
       else {
         const verdict = await post<MotionResponse>("/v1/planning/certify-path", { scene: model.scene, q: path.q, clearance: true });
         setAnswered({ path, verdict });
+        onShow(shownOf(path, verdict));
         if (verdict.stop) onPair(verdict.stop);
         else onMove(path.q[0]!);
       }
@@ -55,7 +59,7 @@ export function Upload({ model, names, onMove, onPair }: Props) {
         {problem && <p class="notice bad">{problem}</p>}
         {answered && <Verdict verdict={answered.verdict} onPair={onPair} />}
       </div>
-      {answered && <Played {...answered} model={model} names={names} onMove={onMove} />}
+      {answered && <p class="quiet small">{answered.path.t ? "The robot's view plays the times of the file as seconds, from 0 on." : "The file has no times. The robot's view plays the path at a speed of 1 in q, so not as your robot moves."}</p>}
     </div>
   );
 }
@@ -75,7 +79,7 @@ function Verdict({ verdict: { outcome, stop, nearest, clearance, proved_distance
   }
   return (
     <div class="notice">
-      <p><strong class="good">Certified.</strong> All along the path, the bodies of every pair are at least {atLeast(1000 * (clearance ?? proved_distance!))} mm apart, as proved. The scene's padding is around them.</p>
+      <p><strong class="proved">Certified.</strong> All along the path, the bodies of every pair are at least {atLeast(1000 * (clearance ?? proved_distance!))} mm apart, as proved. The scene's padding is around them.</p>
       {nearest && <p><button type="button" onClick={() => onPair(nearest)}>Show where they are nearest</button></p>}
     </div>
   );
@@ -87,15 +91,17 @@ function atLeast(value: number): string {
   return Number((Math.floor(value / unit) * unit).toPrecision(3)).toString();
 }
 
-function Played({ path, verdict, model, names, onMove }: Answered & Omit<Props, "onPair">) {
-  const motion = useMemo(() => timed(path), [path]);
-  const parts = useMemo(() => partsOf(motion, verdict), [motion, verdict]);
-  return (
-    <>
-      <p class="quiet small">{path.t ? "The times of the file are played as seconds, from 0 on." : "The file has no times. The path is played at a speed of 1 in q, so not as your robot moves."}</p>
-      <Player motion={motion} parts={parts} names={names} units={model.units} onMove={onMove} />
-    </>
+export function shownOf(path: Path, verdict: MotionVerdict): Shown {
+  const motion = timed(path);
+  const parts = partsOf(motion, verdict);
+  const { stop, clearance, proved_distance, seconds, verify_seconds } = verdict;
+  const took = `verified now, in ${verify_seconds.toPrecision(2)} of ${seconds.toPrecision(2)} s`;
+  const claim = stop ? (
+    <><span class="inside not">Not proved</span> from {parts.at(-1)!.begin.toFixed(2)} s of the path on{parts.length > 1 && <>; <span class="proved">proved</span> before, {took}</>}.</>
+  ) : (
+    <><span class="proved">Proved:</span> on all of the path, the bodies of each covered pair are at least {atLeast(1000 * (clearance ?? proved_distance!))} mm apart; {took}.</>
   );
+  return { ...motion, parts, way: parts.map(() => null), claim, file: null };
 }
 
 /** The path with times from 0 on: those of the file, or the length in q up to each waypoint. */
@@ -105,7 +111,7 @@ function timed({ q, t }: Path): Motion {
   return { q, t: times };
 }
 
-function partsOf({ t }: Motion, { certified_to: to, stop }: MotionResponse): Part[] {
+function partsOf({ t }: Motion, { certified_to: to, stop }: MotionVerdict): Part[] {
   const end = t.at(-1)!;
   if (!stop) return [{ begin: 0, end, by: "motion", said: "on the path, which is certified" }];
   const until = to ? t[to.piece]! + to.time * (t[to.piece + 1]! - t[to.piece]!) : 0;

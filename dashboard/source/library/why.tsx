@@ -1,6 +1,6 @@
 // Why there is no motion, in plain words, and what people can do about it.
-import { asText, shown } from "../common/kinematics";
 import type { BeyondLimit, Collision, PlanResponse } from "../common/schema";
+import { asText, shown } from "../common/units";
 
 interface Props {
   plan: PlanResponse;

@@ -1,6 +1,7 @@
 // The scene to work on: one that is stored, or one that is uploaded now.
 import { useState } from "preact/hooks";
 import { said, upload } from "../common/api";
+import { packed } from "../common/zip";
 import type { SceneDetail } from "../common/schema";
 
 export type Scene = Pick<SceneDetail, "id" | "name" | "joints" | "pairs" | "warnings">;
@@ -16,23 +17,24 @@ export function ChooseScene({ scenes, chosen, onChoose, onUpload }: Props) {
   const [sending, setSending] = useState<string | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
   const [added, setAdded] = useState<SceneDetail | null>(null);
-  const send = async (file: File | undefined): Promise<void> => {
-    if (!file) return;
-    setSending(file.name);
+  const send = async (files: File[]): Promise<void> => {
+    if (files.length === 0) return;
+    const name = files[0]!.webkitRelativePath.split("/")[0] || files[0]!.name;
+    setSending(name);
     setProblem(null);
     setAdded(null);
     try {
-      const scene = await upload<SceneDetail>("/v1/scenes", "bundle", file);
+      const scene = await upload<SceneDetail>("/v1/scenes", "bundle", await packed(files));
       setAdded(scene);
       onUpload(scene);
     } catch (reason) {
-      setProblem(`${file.name} is no scene that can be used. ${said(reason)}`);
+      setProblem(`${name} is no scene that can be used. ${said(reason)}`);
     }
     setSending(null);
   };
   const drop = (event: DragEvent): void => {
     event.preventDefault();
-    void send(event.dataTransfer?.files[0]);
+    void send([...(event.dataTransfer?.files ?? [])]);
   };
   return (
     <div class="choose card" onDragOver={(event) => event.preventDefault()} onDrop={drop}>
@@ -47,10 +49,12 @@ export function ChooseScene({ scenes, chosen, onChoose, onUpload }: Props) {
       </p>
       <p>
         <label for="new-upload">or upload one</label>
-        <input id="new-upload" type="file" accept=".zip,application/zip" disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void send(event.currentTarget.files?.[0])} />
+        <input id="new-upload" type="file" accept=".zip,.urdf,.sdf,.mjcf,application/zip" disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void send([...(event.currentTarget.files ?? [])])} />
+        <label for="new-folder">or its folder</label>
+        <input id="new-folder" type="file" {...{ webkitdirectory: true }} disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void send([...(event.currentTarget.files ?? [])])} />
       </p>
       <p class="quiet small" id="new-upload-says">
-        A zip of the directory with <code>scene.yaml</code> and every model and mesh that it refers to; drop it here. <code>ciris scene add</code> does the same from a terminal.
+        A folder, or a zip of it, with <code>scene.yaml</code> and every model and mesh that it refers to. Or a robot alone: its URDF, SDFormat or MJCF file, or a folder that has one and its meshes; the service then drafts the scene, as <code>ciris scene init</code> does. Drop it here.
       </p>
       <div role="status">
         {sending && <p class="notice">Reading {sending} …</p>}

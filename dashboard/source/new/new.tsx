@@ -1,30 +1,38 @@
 // The form that starts a job: a scene, a configuration that the robot shows, and what shall be done.
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { get, post, said, ServiceError } from "../common/api";
-import { asText, positions } from "../common/kinematics";
+import { positions } from "../common/kinematics";
 import { MomentText, touchingOf, useMoment } from "../common/moment";
 import { Robot } from "../common/robot";
-import type { ContactsResponse, Job, SceneDetail, SceneModel, ScenePage } from "../common/schema";
+import type { ContactsResponse, Job, PlanResponse, SceneDetail, SceneModel, ScenePage } from "../common/schema";
 import { Sliders } from "../common/sliders";
 import { ChooseScene, type Scene } from "./choose";
 import type { Refused } from "./options";
-import { FIRST, request, type Parts, type Wish } from "./request";
+import { asked, type Start as First } from "./again";
+import { Copies } from "./copies";
+import { missing, request, type Parts, type Wish } from "./request";
 import { Wishes } from "./wishes";
+import { asText, withUnits } from "../common/units";
 
 const TRIES = 100;
 
 export function NewIsland({ parts }: { parts: Parts }) {
-  const asked = new URLSearchParams(location.search);
+  // The page rewrites its address, so it is read once. Its configuration is one of its scene, and of no other.
+  const [first, setFirst] = useState<First | null>(null);
   const [scenes, setScenes] = useState<Scene[] | null>(null);
-  const [chosen, setChosen] = useState<string | null>(asked.get("scene"));
+  const [chosen, setChosen] = useState<string | null>(null);
   const [model, setModel] = useState<SceneModel | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
 
   useEffect(() => {
-    get<ScenePage>("/v1/scenes?limit=1000").then(
-      (page) => {
+    const query = new URLSearchParams(location.search);
+    const from = query.get("from");
+    Promise.all([get<ScenePage>("/v1/scenes?limit=1000"), from ? get<Job>(`/v1/jobs/${encodeURIComponent(from)}`) : null]).then(
+      ([page, job]) => {
+        const begin = asked(query, parts, job);
+        setFirst(begin);
         setScenes(page.scenes);
-        setChosen((old) => old ?? page.scenes[0]?.id ?? null);
+        setChosen(begin.scene ?? page.scenes[0]?.id ?? null);
       },
       (reason: unknown) => setProblem(said(reason)),
     );
@@ -46,26 +54,30 @@ export function NewIsland({ parts }: { parts: Parts }) {
     return () => stop.abort();
   }, [chosen]);
 
-  if (!scenes) return <p class={problem ? "notice bad" : "empty"}>{problem ?? "Loading the scenes …"}</p>;
+  if (!scenes || !first) return <p class={problem ? "notice bad" : "empty"}>{problem ?? "Loading the scenes …"}</p>;
   const known = model && !scenes.some(({ id }) => id === model.scene) ? [{ id: model.scene, name: model.name, joints: model.q_star.length, pairs: model.pairs.length, warnings: 0 }, ...scenes] : scenes;
+  const choose = (scene: string): void => {
+    setFirst((old) => old && { ...old, q: null });
+    setChosen(scene);
+  };
   const take = (scene: Scene): void => {
     setScenes([scene, ...scenes.filter(({ id }) => id !== scene.id)]);
-    setChosen(scene.id);
+    choose(scene.id);
   };
   return (
     <div class="new">
-      <ChooseScene scenes={known} chosen={chosen} onChoose={setChosen} onUpload={take} />
+      <ChooseScene scenes={known} chosen={chosen} onChoose={choose} onUpload={take} />
       {problem && <p class="notice bad">{problem}</p>}
-      {model && model.scene === chosen && <Start model={model} parts={parts} asked={asked.get("q")} key={model.scene} />}
+      {model && model.scene === chosen && <Start model={model} parts={parts} first={first} key={model.scene} />}
     </div>
   );
 }
 
-function Start({ model, parts, asked }: { model: SceneModel; parts: Parts; asked: string | null }) {
+function Start({ model, parts, first }: { model: SceneModel; parts: Parts; first: First }) {
   const names = useMemo(() => positions(model), [model]);
-  const [q, setQ] = useState(() => within(model, read(asked, model.q_star.length) ?? model.q_star));
-  const [unread] = useState(() => asked !== null && q.join() !== read(asked, model.q_star.length)?.join());
-  const [wish, setWish] = useState<Wish>(FIRST);
+  const [q, setQ] = useState(() => within(model, read(first.q, model.q_star.length) ?? model.q_star));
+  const [unread] = useState(() => first.q !== null && q.join() !== read(first.q, model.q_star.length)?.join());
+  const [wish, setWish] = useState<Wish>(first.wish);
   const [problem, setProblem] = useState<string | null>(null);
   const [refused, setRefused] = useState<Refused | null>(null);
   const [sending, setSending] = useState(false);
@@ -74,7 +86,7 @@ function Start({ model, parts, asked }: { model: SceneModel; parts: Parts; asked
   const touching = useMemo(() => touchingOf(model, moment), [model, moment]);
   const body = request(model.scene, q, wish, parts);
 
-  useEffect(() => history.replaceState(null, "", `?scene=${model.scene}&q=${q.map((value) => Number(value.toFixed(4))).join(",")}`), [model, q.join()]);
+  useEffect(() => history.replaceState(null, "", withUnits(new URLSearchParams({ scene: model.scene, q: q.map((value) => Number(value.toFixed(4))).join(",") }))), [model, q.join()]);
 
   useEffect(() => {
     get<SceneDetail>(`/v1/scenes/${model.scene}`).then(
@@ -94,9 +106,19 @@ function Start({ model, parts, asked }: { model: SceneModel; parts: Parts; asked
       setProblem(said(reason));
     }
   };
+  const moveNear = async (): Promise<void> => {
+    try {
+      const { collision } = await post<PlanResponse>("/v1/planning/plan", { scene: model.scene, start: q, goal: q });
+      setProblem(collision && !collision.free ? "No free configuration was found near by." : null);
+      if (collision?.free) setQ(collision.free);
+    } catch (reason) {
+      setProblem(said(reason));
+    }
+  };
   const submit = async (event: Event): Promise<void> => {
     event.preventDefault();
-    if (wish.kind === "cover" && wish.goal === "connect" && wish.marks.length < 2) return setProblem("Add at least two configurations to connect.");
+    const lacking = missing(wish);
+    if (lacking) return setProblem(lacking);
     setSending(true);
     setProblem(null);
     setRefused(null);
@@ -123,12 +145,13 @@ function Start({ model, parts, asked }: { model: SceneModel; parts: Parts; asked
       <div>
         <Robot model={model} q={q} onDrag={setQ} touching={touching} label={`The robot of ${model.name}${touching.length ? ", not free" : ""}`} />
         <MomentText moment={moment} />
-        {unread && <p class="notice">The address does not name a configuration within the limits: {asked}. The robot stands at the nearest one, or at q*.</p>}
+        {unread && <p class="notice">The address does not name a configuration within the limits: {first.q}. The robot stands at the nearest one, or at q*.</p>}
         <div class="card">
           <Sliders names={names} units={model.units} lower={model.q_lower} upper={model.q_upper} q={q} onChange={setQ} />
           <p class="toolbar">
             <button type="button" onClick={() => setQ(within(model, model.q_star))}>Centre q*</button>
             <button type="button" onClick={() => void search()}>Random free one</button>
+            {moment.trouble.length > 0 && <button type="button" onClick={() => void moveNear()}>Free one near by</button>}
             {Object.keys(named).length > 0 && (
               <label>
                 Named configuration{" "}
@@ -147,11 +170,7 @@ function Start({ model, parts, asked }: { model: SceneModel; parts: Parts; asked
         <Wishes wish={wish} parts={parts[wish.kind]} refused={refused} onWish={setWish} marks={wish.marks.map((mark) => asText(mark, model.units))} onMark={() => setWish({ ...wish, marks: [...wish.marks, q] })} onGo={(mark) => setQ(wish.marks[mark]!)} />
         <div role="alert">{problem && <p class="notice bad">{problem}</p>}</div>
         <p><button type="submit" class="primary" disabled={sending}>{sending ? "Starting …" : "Start the job"}</button></p>
-        <details>
-          <summary>The same as a request</summary>
-          <p class="small quiet">Send it with <code>POST /v1/jobs</code>. Joint positions are radians and metres.</p>
-          <pre tabIndex={0}>{JSON.stringify(body, null, 1)}</pre>
-        </details>
+        <Copies q={q} wish={wish} parts={parts} body={body} />
       </form>
     </div>
   );

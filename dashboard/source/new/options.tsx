@@ -1,5 +1,5 @@
 // A field for each option that the service describes.
-import type { Given, Option } from "./request";
+import { pathOf, type Given, type Option } from "./request";
 
 /** What the service refused, at the path of a field. */
 export interface Refused {
@@ -21,7 +21,7 @@ export function Options({ options, place, ...rest }: Props) {
     <>
       {options.map((one) => {
         const Shown = one.takes === "group" ? Group : Field;
-        return <Shown key={one.name} one={one} path={`${place}.${one.name}`} {...rest} />;
+        return <Shown key={one.name} one={one} path={pathOf(place, one.name)} {...rest} />;
       })}
     </>
   );

@@ -1,6 +1,7 @@
 // The part of the form that says what the job shall do.
+import { FileField } from "./file";
 import { Options, type Refused } from "./options";
-import type { Part, Wish } from "./request";
+import type { Kind, Part, Wish } from "./request";
 
 interface Props {
   wish: Wish;
@@ -14,35 +15,49 @@ interface Props {
   onGo: (mark: number) => void;
 }
 
+const KINDS: Record<Kind, [string, string]> = {
+  grow: ["Grow one region", "around this configuration of the robot, and certify it."],
+  cover: ["Cover the scene", "with regions, one after another, until a share of it is covered or configurations are connected."],
+  map: ["Map the scene", "to prove as much as possible of the free configurations, cell by cell, without a seed."],
+  "certify-path": ["Certify a motion", "from a file or through configurations, or find its first contact."],
+  certify: ["Certify a polytope", "from a file, as it is: one outcome for each pair."],
+  recertify: ["Certify a region again", "in this scene, after the scene has changed."],
+};
 const MARKS = {
   grow: ["The region must also contain", "such as where it shall meet another region"],
   coverage: ["Regions begin at", "before the service chooses where to begin"],
   connect: ["Connect these configurations", "each gets a region; all of them shall end in one component"],
   map: ["Prove these configurations first", "before the samples decide where to work"],
+  "certify-path": ["Waypoints", "where there is no file; the motion is straight in q between them"],
 } as const;
 
 export function Wishes({ wish, parts, refused, onWish, marks, onMark, onGo }: Props) {
+  const { kind } = wish;
   const set = (part: Partial<Wish>): void => onWish({ ...wish, ...part });
-  const [title, why] = MARKS[wish.kind === "cover" ? wish.goal : wish.kind];
+  const about = kind === "certify" || kind === "recertify" ? null : MARKS[kind === "cover" ? wish.goal : kind];
   const shared = { given: wish.given, onGive: (path: string, value: string) => set({ given: { ...wish.given, [path]: value } }), refused };
-  const goal = (name: string): boolean => (wish.kind === "map" || (wish.kind === "cover" && wish.goal === "coverage")) && name === "coverage";
+  // What everybody should see stands above, and the rest in a fold.
+  const first = (name: string): boolean => kind === "certify-path" || ((kind === "map" || (kind === "cover" && wish.goal === "coverage")) && name === "coverage");
+  const rest = parts.filter(({ options }) => options.some(({ name }) => !first(name)));
   return (
     <>
       <fieldset class="kinds">
         <legend>What shall the job do?</legend>
-        <label class="card">
-          <input type="radio" name="kind" checked={wish.kind === "grow"} onChange={() => set({ kind: "grow" })} />
-          <span><strong>Grow one region</strong> around this configuration of the robot, and certify it.</span>
-        </label>
-        <label class="card">
-          <input type="radio" name="kind" checked={wish.kind === "cover"} onChange={() => set({ kind: "cover" })} />
-          <span><strong>Cover the scene</strong> with regions, one after another, until a share of it is covered or configurations are connected.</span>
-        </label>
-        <label class="card">
-          <input type="radio" name="kind" checked={wish.kind === "map"} onChange={() => set({ kind: "map" })} />
-          <span><strong>Map the scene</strong>: prove as much as possible of the free configurations, cell by cell, without a seed.</span>
-        </label>
+        {(Object.keys(KINDS) as Kind[]).map((name) => (
+          <label class="card" key={name}>
+            <input type="radio" name="kind" checked={kind === name} onChange={() => set({ kind: name, file: null, kept: {} })} />
+            <span><strong>{KINDS[name][0]}</strong> {KINDS[name][1]}</span>
+          </label>
+        ))}
       </fieldset>
+      {(kind === "certify" || kind === "certify-path") && <FileField kind={kind} file={wish.file} onFile={(file) => set({ file })} key={kind} />}
+      {kind === "recertify" && (
+        <p class="field">
+          <label for="new-region">Region</label>
+          <input id="new-region" value={wish.region} spellcheck={false} autocomplete="off" aria-describedby="new-region-says" onInput={(event) => set({ region: event.currentTarget.value })} />
+          <span class="quiet" id="new-region-says">Its id, or the first characters. Its scene has the same robot, limits and q* as this one. The pages of regions lead here.</span>
+        </p>
+      )}
       {wish.kind === "cover" && (
         <p class="field">
           <label for="new-goal">Goal</label>
@@ -52,9 +67,9 @@ export function Wishes({ wish, parts, refused, onWish, marks, onMark, onGo }: Pr
           </select>
         </p>
       )}
-      {parts.map(({ place, options }) => <Options key={place} place={place} options={options.filter(({ name }) => goal(name))} {...shared} />)}
-      <div class="marks">
-        <p>{title} <span class="quiet">({why})</span></p>
+      {parts.map(({ place, options }) => <Options key={place} place={place} options={options.filter(({ name }) => first(name))} {...shared} />)}
+      {about && <div class="marks">
+        <p>{about[0]} <span class="quiet">({about[1]})</span></p>
         {marks.length > 0 && (
           <ul>
             {marks.map((words, i) => (
@@ -66,16 +81,17 @@ export function Wishes({ wish, parts, refused, onWish, marks, onMark, onGo }: Pr
           </ul>
         )}
         <button type="button" onClick={onMark}>Add this configuration</button>
-      </div>
-      <details onInvalidCapture={(event) => void (event.currentTarget.open = true)}>
+      </div>}
+      {Object.keys(wish.kept).length > 0 && <p class="notice">Kept from the earlier job: {Object.keys(wish.kept).join(", ")}. <button type="button" class="plain" onClick={() => set({ kept: {} })}>remove</button></p>}
+      {rest.length > 0 && <details onInvalidCapture={(event) => void (event.currentTarget.open = true)}>
         <summary>More options</summary>
-        {parts.map(({ place, title, options }) => (
+        {rest.map(({ place, title, options }) => (
           <fieldset key={place}>
             <legend>{title}</legend>
-            <Options place={place} options={options.filter(({ name }) => !goal(name))} {...shared} />
+            <Options place={place} options={options.filter(({ name }) => !first(name))} {...shared} />
           </fieldset>
         ))}
-      </details>
+      </details>}
       <details onInvalidCapture={(event) => void (event.currentTarget.open = true)}>
         <summary>Deadline and priority</summary>
         <p class="field">

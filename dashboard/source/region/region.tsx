@@ -1,6 +1,7 @@
 // A region to walk about in: the robot swept through it, sliders that stay inside, the ends of each joint, slices, cells.
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
 import { get, said } from "../common/api";
+import { InClaim } from "../common/claim";
 import { shortNames } from "../common/kinematics";
 import { contains, rooms, toQ, toS, type Faces, type Space } from "../common/polytope";
 import { Robot } from "../common/robot";
@@ -62,7 +63,6 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
   const inside = contains(space, faces, q);
   const bodies = pairs.filter(({ a, b }) => !ofCondition(a) && !ofCondition(b)).length;
   const kept = bodies < pairs.length ? ", and the conditions hold" : "";
-  const besides = region.not_covered.pairs ? ` ${region.not_covered.summary}.` : "";
 
   useEffect(() => {
     setCells(null);
@@ -83,15 +83,31 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
   return (
     <section aria-labelledby="h-explore" class="explore">
       <h2 id="h-explore">Look inside</h2>
+      <InClaim place="now">
+        <p role="status" class={inside ? "proved" : "inside not"}>{inside ? `The robot is inside the region: no collision of the ${bodies} covered pairs${kept}, as proved.` : "The robot is outside the region: nothing is proved here."}</p>
+      </InClaim>
       <div class="toolbar">
         <button type="button" aria-pressed={playing} onClick={() => setPlaying(!playing)}>{playing ? "Pause" : "Sweep through the region"}</button>
         <button type="button" onClick={() => go(configurations.center)}>Centre</button>
         {configurations.seed && <button type="button" onClick={() => go(configurations.seed!)}>Seed</button>}
         <label><input type="checkbox" checked={swept} onChange={(event) => setSwept(event.currentTarget.checked)} /> show {GHOSTS} samples</label>
-        <span role="status" class={inside ? "inside" : "inside not"}>{inside ? `The robot is inside the region: no collision of the ${bodies} pairs below${kept}, as proved.${besides}` : "The robot is outside the region: nothing is proved here."}</span>
       </div>
       <div class="views">
-        <Robot model={model} q={q} ghosts={ghosts} label={`The robot of ${model.name} inside the region${swept ? `, with ${GHOSTS} samples of it` : ""}`} />
+        <div class="stay">
+          <Robot model={model} q={q} ghosts={ghosts} label={`The robot of ${model.name} inside the region${swept ? `, with ${GHOSTS} samples of it` : ""}`} />
+          <div class="joints">
+            <Sliders names={space.joints} units={model.units} lower={space.q_lower} upper={space.q_upper} allowed={inside ? rooms(space, faces, q) : undefined} q={q} onChange={go} />
+            <div class="ends" role="group" aria-label="Ends of each joint within the region">
+              {configurations.extremes.map((extreme, i) => (
+                <p key={extreme.joint}>
+                  <span class="sr">{names[i]}: </span>
+                  <button type="button" onClick={() => go(extreme.lower)} aria-label={`${extreme.joint} min`}>min</button>{" "}
+                  <button type="button" onClick={() => go(extreme.upper)} aria-label={`${extreme.joint} max`}>max</button>
+                </p>
+              ))}
+            </div>
+          </div>
+        </div>
         <div>
           <Slice scene={region.scene} space={space} units={model.units} q={q} onPick={go} regions={only} strongest={id} cells={cells} />
           <label class="pair-choice">
@@ -104,18 +120,6 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
             </select>
           </label>
           {cellsProblem && <p class="notice bad">{cellsProblem}</p>}
-        </div>
-      </div>
-      <div class="joints">
-        <Sliders names={space.joints} units={model.units} lower={space.q_lower} upper={space.q_upper} allowed={inside ? rooms(space, faces, q) : undefined} q={q} onChange={go} />
-        <div class="ends" role="group" aria-label="Ends of each joint within the region">
-          {configurations.extremes.map((extreme, i) => (
-            <p key={extreme.joint}>
-              <span class="sr">{names[i]}: </span>
-              <button type="button" onClick={() => go(extreme.lower)} aria-label={`${extreme.joint} least`}>least</button>{" "}
-              <button type="button" onClick={() => go(extreme.upper)} aria-label={`${extreme.joint} greatest`}>greatest</button>
-            </p>
-          ))}
         </div>
       </div>
     </section>

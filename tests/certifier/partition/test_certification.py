@@ -210,6 +210,7 @@ def test_a_search_that_runs_out_of_cells_goes_on_from_where_it_was():
         result = shared.go_on(0, 1, rounds[-1])
         assert result.outcome is Outcome.INCONCLUSIVE
         assert result.margin is None
+    assert result.detail == "no cell is open; the cells are yet to be put together and verified"
     rounds.append([result.subtrees])
     assert len(rounds) >= 3
     check_certified(scene, polytope, 0, shared.put_together(0, rounds))

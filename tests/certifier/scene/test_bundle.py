@@ -157,7 +157,8 @@ def test_an_honest_directory_passes(tmp_path):
     ("bundle", "code"),
     [
         (b"not a zip", "bundle_zip"),
-        (zipped({"arm.urdf": "<robot name='a'/>"}), "bundle_zip"),
+        (zipped({"arm.obj": ""}), "bundle_zip"),
+        (zipped({"arm.urdf": "<robot name='a'>"}), "bundle_xml"),
         (zipped({"a.yaml": SCENE, "b.yaml": SCENE}), "bundle_zip"),
         (zipped({"bundle.json": "[]"}), "bundle_zip"),
         (zipped({"bundle.json": "{"}), "bundle_zip"),

@@ -1,0 +1,41 @@
+// The motion of a job that has ended: the robot moves along it, as far as it is proved and beyond.
+import { useEffect, useState } from "preact/hooks";
+import { get, said } from "../common/api";
+import { positions } from "../common/kinematics";
+import { Robot } from "../common/robot";
+import type { Job, JobMotion, SceneModel } from "../common/schema";
+import { Player, type Shown } from "../library/player";
+import { shownOf } from "../library/upload";
+
+interface Loaded {
+  model: SceneModel;
+  motion: Shown;
+}
+
+async function load(id: string, scene: string): Promise<Loaded | null> {
+  const [{ options }, verdict, model] = await Promise.all([get<Job>(`/v1/jobs/${id}`), get<JobMotion>(`/v1/jobs/${id}/motion`), get<SceneModel>(`/v1/scenes/${scene}/model`)]);
+  const { q, space } = options as { q?: number[][]; space?: string };
+  return q && space !== "s" ? { model, motion: shownOf({ q, t: null }, verdict) } : null;
+}
+
+export function Motion({ job, scene }: { job: string; scene: string }) {
+  const [loaded, setLoaded] = useState<Loaded | null>(null);
+  const [problem, setProblem] = useState<string | null>(null);
+  const [q, setQ] = useState<number[] | null>(null);
+  useEffect(() => {
+    load(job, scene).then(setLoaded, (reason: unknown) => setProblem(said(reason)));
+  }, [job, scene]);
+  if (problem) return <p class="notice bad">The motion cannot be drawn: {problem}</p>;
+  if (!loaded) return null; // Or the motion is not straight in q, and only the claim says what is known of it.
+  const { model, motion } = loaded;
+  return (
+    <section aria-labelledby="h-motion">
+      <h2 id="h-motion">The motion</h2>
+      <div class="stage">
+        <Robot model={model} q={q ?? motion.q[0]!} label={`The robot of ${model.name} on the motion`} />
+        <Player motion={motion} names={positions(model)} units={model.units} onMove={setQ} />
+      </div>
+      <p class="quiet small">The motion is played at a speed of 1 in q, so not as your robot moves.</p>
+    </section>
+  );
+}

@@ -1,0 +1,94 @@
+"""A newcomer's first minute: what an empty service says and offers, and which files it takes as they are."""
+
+from __future__ import annotations
+
+import io
+import shutil
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from fastapi.testclient import TestClient
+
+from certifier.scene.bundle import pack_bundle
+from tests.dashboard.samples import NAMES, ROOT, SAMPLES, files
+
+ARM = ROOT / "examples" / "arm_3dof" / "arm.urdf"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_samples_are_the_examples(name: str) -> None:
+    packed = (SAMPLES / f"{name}.zip").read_bytes()
+    assert files(packed) == files(pack_bundle(ROOT / "examples" / name / "scene.yaml")), "run: python -m tests.dashboard.samples"
+
+
+@pytest.mark.parametrize("path", ["/", "/scenes", "/new"])
+def test_an_empty_service_says_what_it_is_for_and_has_a_scene_by_one_click(
+    page: Any, url: str, client: TestClient, barriers: Any, path: str
+) -> None:
+    page.goto(url + path)
+    page.get_by_text("ciris proves that a robot does not collide").wait_for()
+    assert barriers(page) == []
+    offered = {
+        Path(button.get_attribute("data-sample")).stem: button.get_attribute("data-q") for button in page.locator("[data-sample]").all()
+    }
+    seeds = {name: yaml.safe_load((ROOT / "examples" / name / "seed.yaml").read_text())["q"] for name in NAMES}
+    assert offered == {name: ",".join(map(str, q)) for name, q in seeds.items()}
+    page.get_by_role("button", name="Try two links in a plane").click()
+    page.get_by_text("No collision (computed, not proved)").wait_for()
+    assert [scene["name"] for scene in client.get("/v1/scenes").json()["scenes"]] == ["planar-2dof"]
+    page.goto(url + path)
+    page.get_by_role("heading", level=1).wait_for()
+    assert page.get_by_text("ciris proves that a robot does not collide").count() == 0
+
+
+def test_a_sample_that_may_not_be_added_is_said(page: Any, url: str, complaints: list[str]) -> None:
+    page.route(
+        "**/v1/scenes", lambda route: route.fulfill(status=403, content_type="application/problem+json", body='{"detail": "no key"}')
+    )
+    page.goto(url)
+    button = page.get_by_role("button", name="Try two links in a plane")
+    button.click()
+    page.get_by_role("alert").filter(has_text="no key").wait_for()
+    assert button.is_enabled()
+    complaints.clear()
+
+
+def test_a_urdf_is_taken_as_it_is(page: Any, url: str, client: TestClient) -> None:
+    page.goto(f"{url}/new")
+    page.get_by_label("or upload one").set_input_files(ARM)
+    page.get_by_text("arm is stored, with 3 joints").wait_for()
+    page.locator(".slider").nth(2).wait_for()
+    (scene,) = client.get("/v1/scenes").json()["scenes"]
+    assert (scene["name"], scene["joints"]) == ("arm", 3)
+
+
+def test_a_folder_is_taken_as_it_is(page: Any, url: str, client: TestClient) -> None:
+    page.goto(f"{url}/new")
+    page.get_by_label("or its folder").set_input_files(ROOT / "examples" / "planar_2dof")
+    page.get_by_text("planar-2dof is stored, with 2 joints and 6 pairs").wait_for()
+
+
+def zipped(directory: Path) -> bytes:
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w") as archive:
+        for file in sorted(directory.rglob("*")):
+            archive.write(file, file.relative_to(directory))
+    return data.getvalue()
+
+
+def test_two_robots_without_a_scene_are_refused(client: TestClient, tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        shutil.copy(ARM, tmp_path / f"{name}.urdf")
+    answer = client.post("/v1/scenes", files={"bundle": ("two.zip", zipped(tmp_path), "application/zip")})
+    assert (answer.status_code, answer.json()["code"]) == (422, "bundle_zip")
+    assert "2 files that may be the scene file or the robot's model" in answer.json()["detail"]
+
+
+def test_a_model_that_leads_out_of_its_zip_is_refused_before_drake_sees_it(client: TestClient, tmp_path: Path) -> None:
+    mesh = '<collision><geometry><mesh filename="../../secret.obj"/></geometry></collision>'
+    (tmp_path / "bad.urdf").write_text(f'<robot name="bad"><link name="base">{mesh}</link></robot>')
+    answer = client.post("/v1/scenes", files={"bundle": ("bad.zip", zipped(tmp_path), "application/zip")})
+    assert (answer.status_code, answer.json()["code"]) == (422, "bundle_uri")

@@ -1,0 +1,50 @@
+"""The page of a motion that a job has certified, in a real browser: its claim stays in view, and the robot moves along it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from certifier.model import Scene
+from certifier.verify.decimals import at_least_mm
+from tests.dashboard.test_truth import until
+
+FREE, BLOCKED = [[-0.3, 0.1], [-0.6, 0.4]], [[-0.3, 0.1], [0.0, 0.1], [0.8, 0.1]]
+
+
+@pytest.mark.usefixtures("worker")
+def test_a_motion_has_its_claim_and_is_played(page: Any, url: str, planar: Scene, client: TestClient, barriers: Any) -> None:
+    asked = {"kind": "certify-path", "scene": "planar", "q": FREE, "clearance": True}
+    job = client.post("/v1/jobs", json=asked).json()["id"]
+    page.goto(f"{url}/jobs/{job}")
+    claim = page.locator(".claim")
+    claim.get_by_text("all along the motion, the bodies of each covered pair stay apart").wait_for(timeout=60_000)
+    verdict = client.get(f"/v1/jobs/{job}/motion").json()
+    assert claim.locator("dd").all_text_contents()[:2] == ["2", f"at least {at_least_mm(verdict['clearance'])}"]
+    page.get_by_label("Time, seconds").press("End")
+    page.locator(".moment", has_text="on the path, which is certified").wait_for()
+    length = np.linalg.norm(np.subtract(*FREE))
+    assert page.locator(".player output").text_content() == f"{length:.2f} s"
+    assert barriers(page) == []
+    page.set_viewport_size({"width": 1000, "height": 500})
+    page.mouse.wheel(0, 4000)
+    until(lambda: page.evaluate("scrollY") > 300)
+    assert claim.bounding_box()["y"] == pytest.approx(0, abs=1)
+
+
+@pytest.mark.usefixtures("worker")
+def test_where_nothing_is_proved_the_motion_says_so(page: Any, url: str, planar: Scene, client: TestClient) -> None:
+    job = client.post("/v1/jobs", json={"kind": "certify-path", "scene": "planar", "q": BLOCKED}).json()["id"]
+    page.goto(f"{url}/jobs/{job}")
+    page.locator(".claim", has_text="After that, nothing is proved.").wait_for(timeout=60_000)
+    page.get_by_label("Time, seconds").press("End")
+    page.locator(".moment", has_text="where nothing is proved").wait_for()
+    page.get_by_text("touch at the configuration named").wait_for()
+    assert "m apart" not in page.locator("main").text_content()
+
+
+def test_a_large_distance_has_no_exponent() -> None:
+    assert [at_least_mm(metres) for metres in (1.1547, 0.5, 12.3456)] == ["1150 mm", "500 mm", "12300 mm"]
