@@ -395,8 +395,8 @@ class Approach(Place):
     a: str
     b: str
     distance: float
-    """How far the bodies, with the scene's padding, are apart there, in metres, in floating point; 0 where they overlap. It has no unit where
-    the pair stands for a condition that is a cone or a range of angles."""
+    """How far the bodies, with the scene's padding, are apart there, in metres, in floating point; 0 where they overlap. It has no unit
+    where the pair stands for a condition that is a cone or a range of angles."""
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,8 @@ COUNTED_DAYS = 1
 """A revoked key counts against the limit of its project for this many days, so that making and revoking keys in turn has a limit too."""
 KEPT_DAYS = 30
 """A revoked key is listed for this many days. Then the service forgets it."""
+LISTED = 1000
+"""At most this many names of keys are offered where one is chosen."""
 KEYS_TOGETHER, JOBS_TOGETHER = 100, 1000
 """At most this many keys, and mentions of them in jobs, are forgotten in one transaction."""
 _KEY = re.compile(r"ciris_([0-9a-f]{12})_[\w-]{43}", re.ASCII)
@@ -185,8 +187,8 @@ def check_bind(settings: Settings) -> None:
 
 
 def names(session: Session) -> Sequence[str]:
-    """Returns the names of the project's keys, in order, those of revoked keys too."""
-    return session.scalars(select(ApiKeyRow.name).distinct().order_by(ApiKeyRow.name)).all()
+    """Returns the names of keys of the project, in order, those of revoked keys too; LISTED at most."""
+    return session.scalars(select(ApiKeyRow.name).distinct().order_by(ApiKeyRow.name).limit(LISTED)).all()
 
 
 def named(session: Session, name: str) -> str:
