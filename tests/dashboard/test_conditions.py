@@ -13,7 +13,7 @@ __all__ = ["upright"]
 def test_a_condition_that_is_not_kept_is_said_and_painted(page: Any, url: str, upright: Any) -> None:
     page.goto(f"{url}/scenes/planar")
     robot = page.locator("figure.robot canvas")
-    page.get_by_text("No collision (computed, by floating point").wait_for()
+    page.get_by_text("No collision (computed, not proved)").wait_for()
     assert orange(page.context.browser, robot.screenshot()) == 0
     page.get_by_role("spinbutton", name="arm/joint1, degrees, as a number").fill("-40")
     page.get_by_role("spinbutton", name="arm/joint2, degrees, as a number").fill("-40")

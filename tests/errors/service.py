@@ -175,6 +175,7 @@ SERVICE: Table = {
     ("job_not_retryable", "job"): [lambda t: t.ask("POST", f"/v1/jobs/{queued(t)}/retry")],
     ("job_not_found", "job"): [lambda t: t.ask("GET", "/v1/jobs/nope")],
     ("key_name", "name"): [lambda t: write(t, lambda session: keys.add(session, "a b", Scope.READ)), lambda t: write(t, named_twice)],
+    ("key_not_found", "key"): [lambda t: write(t, lambda session: keys.named(session, "nobody"))],
     ("key_not_found", "name"): [lambda t: write(t, lambda session: keys.revoke(session, "nobody"))],
     ("no_database", "CIRIS_DATABASE_URL"): [
         lambda t: keys.check_bind(Settings(host="0.0.0.0", database_url=f"sqlite:///{t.directory}/none.sqlite3"))
