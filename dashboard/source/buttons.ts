@@ -1,5 +1,5 @@
-// Buttons with data-post ask the service to do something; forms with data-submit-on-change need no button; times are shown as the reader's clock has them.
-import { post, said, upload } from "./common/api";
+// Buttons with data-post or data-delete ask the service to do something; forms with data-submit-on-change need no button; times are shown as the reader's clock has them.
+import { post, remove, said, upload } from "./common/api";
 import { refresh } from "./live";
 
 interface Answer {
@@ -18,10 +18,15 @@ export function localTimes(root: ParentNode): void {
 
 export function startButtons(): void {
   document.addEventListener("click", (click) => {
-    const button = (click.target as Element).closest<HTMLButtonElement>("button[data-post]");
+    const button = (click.target as Element).closest<HTMLButtonElement>("button[data-post], button[data-delete]");
     if (button) void press(button);
     const sample = (click.target as Element).closest<HTMLButtonElement>("button[data-sample]");
     if (sample) void addSample(sample);
+  });
+  const making = document.querySelector<HTMLFormElement>("#make-key");
+  making?.addEventListener("submit", (submit) => {
+    submit.preventDefault();
+    void makeKey(making);
   });
   for (const form of document.querySelectorAll<HTMLFormElement>("form[data-submit-on-change]")) {
     form.querySelector("button")!.hidden = true;
@@ -34,11 +39,12 @@ export function startButtons(): void {
 }
 
 async function press(button: HTMLButtonElement): Promise<void> {
-  const { post: path, follow, statement, confirm: question } = button.dataset;
+  const { post: path, delete: gone, follow, statement, confirm: question } = button.dataset;
   if (question && !confirm(question)) return;
   button.disabled = true;
   try {
-    const answer = await post<Answer>(path!);
+    if (gone) await remove(gone);
+    const answer = gone ? {} : await post<Answer>(path!);
     if (follow) location.assign(follow + answer.id);
     else if (statement) {
       say(document.getElementById(statement)!, answer);
@@ -48,6 +54,22 @@ async function press(button: HTMLButtonElement): Promise<void> {
     button.disabled = false;
     complain(button, said(problem));
   }
+}
+
+/** Makes a key and shows it, which nobody can do again. */
+async function makeKey(form: HTMLFormElement): Promise<void> {
+  const place = document.getElementById("made-key")!;
+  try {
+    const { name, key } = await post<{ name: string; key: string }>("/v1/keys", Object.fromEntries(new FormData(form)));
+    place.className = "notice";
+    place.replaceChildren(`The key ${name}. Copy it now, nobody can see it again: `, Object.assign(document.createElement("code"), { textContent: key }));
+    form.reset();
+    void refresh(form.dataset.refresh!);
+  } catch (problem) {
+    place.className = "notice bad";
+    place.textContent = said(problem);
+  }
+  place.hidden = false;
 }
 
 /** Adds a scene that comes with the service, and opens the form with it. */

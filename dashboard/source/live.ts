@@ -52,7 +52,7 @@ const FOCUSABLE = "a, button, summary, [tabindex]";
 
 /** Says what a focusable element is for; a row that comes before it does not change that. */
 function purpose(element: Element): string {
-  return ["href", "data-post", "id", "aria-label"].map((name) => element.getAttribute(name)).join(" ") + element.textContent;
+  return ["href", "data-post", "data-delete", "id", "aria-label"].map((name) => element.getAttribute(name)).join(" ") + element.textContent;
 }
 
 let last = "";

@@ -87,7 +87,9 @@ def test_the_page_of_a_motion_says_what_is_proved_and_what_is_not(client: TestCl
         assert f"<dd>{2 if verdict['certified_to'] else 0}</dd>" in claim
 
 
-def test_names_are_escaped(client: TestClient, database: Database) -> None:
+def test_names_are_escaped(client: TestClient, database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A scene cannot get such a name any more; an older database may have one."""
+    monkeypatch.setattr(scenes, "check_name", lambda name, field: None)
     with database.write() as session:
         row = scenes.add(session, replace(slider(), name="<script>alert(1)</script>"))
     for path in ("/", f"/scenes/{row.id}"):

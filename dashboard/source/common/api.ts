@@ -40,6 +40,10 @@ export async function post<T>(path: string, body?: unknown, signal?: AbortSignal
   return answer<T>(await fetch(path, { method: "POST", headers, body: body === undefined ? undefined : JSON.stringify(body), signal }));
 }
 
+export async function remove(path: string): Promise<void> {
+  return answer<void>(await fetch(path, { method: "DELETE", headers: { Accept: "application/json" } }));
+}
+
 export async function upload<T>(path: string, field: string, file: File): Promise<T> {
   const form = new FormData();
   form.append(field, file);

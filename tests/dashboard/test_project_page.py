@@ -1,0 +1,74 @@
+"""The page of a project, in a browser: what it stores, its keys, and who changed what."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from fastapi.testclient import TestClient
+
+from api.access import KEYS_SECONDS
+from db import keys, projects
+from db.keys import Scope
+from db.session import Database
+
+
+def made(database: Database, *wanted: tuple[str, Scope, str]) -> list[str]:
+    """Makes keys, and waits until the service knows that it has some."""
+    with database.write() as session:
+        projects.add(session, "others")
+        found = [keys.add(session, name, scope, project) for name, scope, project in wanted]
+    time.sleep(KEYS_SECONDS)
+    return found
+
+
+def test_an_admin_makes_and_revokes_keys_and_sees_who_did(
+    page: Any, url: str, database: Database, barriers: Any, complaints: list[str]
+) -> None:
+    boss, _ = made(database, ("boss", Scope.ADMIN, "default"), ("theirs", Scope.ADMIN, "others"))
+    page.set_extra_http_headers({"Authorization": f"Bearer {boss}"})
+    page.goto(f"{url}/project")
+    assert "0.0 MB of scenes" in page.text_content("main")
+    page.get_by_label("Name").fill("planner")
+    page.get_by_label("It may").select_option("submit")
+    page.get_by_role("button", name="Make the key").click()
+    page.get_by_role("row").filter(has_text="planner").first.wait_for()
+    shown = page.locator("#made-key code").text_content()
+    with database.read() as session:
+        known = keys.check(session, shown)
+    assert known is not None
+    assert (known.name, known.scope, known.project) == ("planner", Scope.SUBMIT, "default")
+    assert barriers(page) == []
+    asked: list[str] = []
+    page.once("dialog", lambda dialog: (asked.append(dialog.message), dialog.accept()))
+    page.get_by_role("button", name="Revoke the key planner").click()
+    page.get_by_role("button", name="Revoke the key planner").wait_for(state="detached")
+    assert asked == ["Who uses the key planner is refused from now on. Nothing takes this back."]
+    with database.read() as session:
+        assert keys.check(session, shown) is None
+    log = page.get_by_role("region", name="Who changed what").text_content()
+    assert "key revoked" in log
+    assert "planner (submit)" in log
+    assert "theirs" not in page.text_content("main"), "another project's key"
+    page.get_by_label("Name").fill("boss")
+    page.get_by_role("button", name="Make the key").click()
+    page.locator("#made-key.bad").wait_for()
+    assert "422" in complaints.pop(), "the browser notes the refusal"
+
+
+def test_others_see_what_the_project_stores_and_nothing_of_its_keys(client: TestClient, database: Database) -> None:
+    reader, submitter = made(database, ("reader", Scope.READ, "default"), ("submitter", Scope.SUBMIT, "default"))
+    for key, may in ((reader, "look at everything<"), (submitter, "start and cancel jobs")):
+        for path in ("/project", "/project/live"):
+            answer = client.get(path, headers={"Authorization": f"Bearer {key}"})
+            assert answer.status_code == 200
+            assert "data-delete" not in answer.text
+            assert "submitter" not in answer.text.partition("<main")[2]
+        assert may in client.get("/project", headers={"Authorization": f"Bearer {key}"}).text
+
+
+def test_a_service_without_keys_says_so(client: TestClient) -> None:
+    answer = client.get("/project")
+    assert answer.status_code == 200
+    assert "everybody may do everything" in answer.text
+    assert "make-key" not in answer.text, "the first key is made at the command line"
