@@ -156,7 +156,9 @@ def _exactly(session: Session, given: str) -> str | None:
     """Returns the scene that has this id, that the name means, or that ``NAME@ID`` is; None where there is none."""
     if (version := _version(session, given)) is not None:
         return version.scene_id
-    found = session.scalar(select(SceneRow.id).where(SceneRow.id == given))
+    name, _, scene_id = given.rpartition("@")
+    wanted = scene_id if name.endswith(STAGED) else given  # it may have been promoted, or something else staged, since
+    found = session.scalar(select(SceneRow.id).where(SceneRow.id == wanted))
     if found is None and (named := meaning(session, given)) is not None:
         return named.scene_id
     return found

@@ -10,8 +10,9 @@ import pytest
 from fastapi.testclient import TestClient
 
 from certifier.model import Scene
-from db import scenes
+from db import scenes, staging
 from db.session import Database
+from tests.scenes import slider
 
 HOME, AWAY = -0.1, 0.15
 
@@ -145,6 +146,19 @@ def test_each_name_of_a_scene_has_its_own_configurations(client: TestClient, oth
     assert all(name in refused["detail"] for name in ("'home'", "'slider'", "'other'")), refused
     assert ask(client, "/v1/planning/contains", scene=other[:8], q=["rest", "away"])["status"] == 200
     assert ask(client, "/v1/planning/contains", scene=f"third@{other}", q=["rest"])["code"] == "scene_not_found"
+
+
+def test_a_staged_scene_is_found_by_its_id_for_as_long_as_it_is_stored(client: TestClient, database: Database, other: str) -> None:
+    (joint,) = (position["name"] for position in client.get("/v1/scenes/slider").json()["positions"])
+    with database.write() as session:
+        new = staging.stage(session, "slider", replace(slider(posts=1), configurations={"home": {joint: 0.02}})).id
+    given = f"slider@staged@{new}"
+    assert client.get(f"/v1/scenes/{given}").json()["configurations"] == {"home": {joint: 0.02}}
+    with database.write() as session:
+        staging.promote(session, "slider", without_regions=True)
+    assert client.get(f"/v1/scenes/{given}").json()["id"] == new
+    assert client.get("/v1/scenes/slider").json()["configurations"] == {"home": {joint: 0.02}}
+    assert client.get(f"/v1/scenes/slider@{other}").json()["configurations"].keys() == {"home", "away"}, "what the name meant before"
 
 
 def test_a_constrained_scene_keeps_the_configurations(client: TestClient, other: str) -> None:
