@@ -11,7 +11,7 @@ from certifier.collisions.seen import seen_of
 from certifier.conditioned import condition_of, distance_of
 from certifier.conditions import MODEL, Condition, Cone, Distance, InBall, Inside, Range, SlideRange, of_condition
 from certifier.kinematics import Kinematics
-from certifier.model import Array, Pair, Scene
+from certifier.model import Array, Geometry, Pair, Scene
 from certifier.motion.bodies import bodies_of
 
 
@@ -33,8 +33,12 @@ def not_kept(scene: Scene, pair: Pair, q: Array | None = None) -> str | None:
     condition = condition_of(scene, pair) or distance_of(scene, pair)
     if condition is None or (isinstance(condition, Distance) and (q is None or _apart(scene, pair, q) <= 0)):
         return None
-    by = "" if q is None else f": {_by(scene, pair, condition, q)}"
-    return f"the condition '{condition.name}' is not kept{by}"
+    if q is None:
+        return f"the condition '{condition.name}' is not kept"
+    if isinstance(condition, InBall) and (inside := -_beyond(scene, pair, condition, q)) >= 0:
+        what = f"{_who(scene, pair, condition)} is {1000 * inside:.3g} mm from the surface of the ball, which is too near"
+        return f"the condition '{condition.name}' cannot be proved: {what}"
+    return f"the condition '{condition.name}' is not kept: {_by(scene, pair, condition, q)}"
 
 
 def _by(scene: Scene, pair: Pair, condition: Condition, q: Array) -> str:
@@ -55,20 +59,29 @@ def _by(scene: Scene, pair: Pair, condition: Condition, q: Array) -> str:
             beyond = max(condition.lower - total, total - condition.upper)
             return f"the sum of the positions is {1000 * beyond:.4g} mm beyond its range"
         case Inside() | InBall():
-            face = f"{MODEL}/{condition.name}/face"
-            geometry = scene.geometry(pair.b if pair.a.startswith(face) else pair.a)
-            points = kinematics.points(condition.of, geometry.body, geometry.vertices, s)[0]
-            if isinstance(condition, InBall):
-                beyond = float(np.linalg.norm(points - condition.center, axis=1).max()) - condition.radius + geometry.radius
-            else:
-                faces = np.array(condition.faces)
-                beyond = float((points @ faces[:, :3].T - faces[:, 3]).max()) + geometry.radius
-            what = f"a point of {geometry.body}" if of_condition(geometry.name) else geometry.name
-            if beyond <= 0:
-                return f"{what} is {-1000 * beyond:.4g} mm from the surface of the ball, which is too near to prove it"
-            return f"{what} reaches {1000 * beyond:.4g} mm beyond the zone"
+            return f"{_who(scene, pair, condition)} reaches {1000 * _beyond(scene, pair, condition, q):.4g} mm beyond the zone"
         case Distance():
             return f"{pair.a} and {pair.b} are {_apart(scene, pair, q):.4g} m apart, and {condition.metres:.9g} at least"
+
+
+def _staying(scene: Scene, pair: Pair, condition: Inside | InBall) -> Geometry:
+    """Returns the geometry of a pair that has to stay in a zone."""
+    return scene.geometry(pair.b if pair.a.startswith(f"{MODEL}/{condition.name}/face") else pair.a)
+
+
+def _who(scene: Scene, pair: Pair, condition: Inside | InBall) -> str:
+    geometry = _staying(scene, pair, condition)
+    return f"a point of {geometry.body}" if of_condition(geometry.name) else geometry.name
+
+
+def _beyond(scene: Scene, pair: Pair, condition: Inside | InBall, q: Array) -> float:
+    """Returns how far the geometry of a pair reaches beyond its zone at q, (n,), in metres; negative inside."""
+    geometry, s = _staying(scene, pair, condition), scene.to_s(scene.in_windows(q))[None]
+    points = Kinematics.of(scene).points(condition.of, geometry.body, geometry.vertices, s)[0]
+    if isinstance(condition, InBall):
+        return float(np.linalg.norm(points - condition.center, axis=1).max()) - condition.radius + geometry.radius
+    faces = np.array(condition.faces)
+    return float((points @ faces[:, :3].T - faces[:, 3]).max()) + geometry.radius
 
 
 def _sum(scene: Scene, condition: Range | SlideRange, q: Array) -> float:

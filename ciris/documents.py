@@ -64,3 +64,14 @@ def bundle(path: str | Path) -> bytes:
     from certifier.scene.bundle import pack_bundle
 
     return pack_bundle(named(os.fspath(path) if isinstance(path, os.PathLike) else path, "path", "the path of a scene file"))
+
+
+def asked_as(document: Document, given: str | None) -> str:
+    """Returns what requests call a scene that the service described.
+
+    Args:
+        given: the name or id that was asked for; None for a scene that was added under its name.
+    """
+    if given is None or given == document["name"]:
+        return f"{document['name']}@{document['id']}"
+    return given if "@" in given else str(document["id"])

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ciris.answers import NotCovered
-from ciris.documents import Document, named
+from ciris.documents import Document, asked_as, named
 from ciris.reading import read
 from ciris.space import InSpace, Space, frozen
 
@@ -30,6 +30,8 @@ class Scene(InSpace):
     """The pairs of geometries that no proof about the scene is about."""
     padding: float
     """Metres added around both geometries of every pair that has no padding of its own."""
+    asked: str
+    """What requests call it: ``NAME@ID``, so that its named configurations are those of the name; or the id alone, if that was given."""
     configurations: Mapping[str, Mapping[str, float]]
     """The named configurations: positions of joints by their names, in radians or metres."""
 
@@ -44,14 +46,21 @@ class Scene(InSpace):
         return f"Scene({self.name!r}, {self.id}: {len(self.joints)} joints, {self.geometries} geometries, {self.pairs} pairs)"
 
     @classmethod
-    def of(cls, document: Document) -> Scene:
-        """Reads the service's description, ``GET /v1/scenes/{scene}``."""
+    def of(cls, document: Document, given: str | None = None) -> Scene:
+        """Reads the service's description, ``GET /v1/scenes/{scene}``.
+
+        Args:
+            given: the name or id that was asked for; None for a scene that was added under its name.
+        """
         joints = document["positions"]
         q_star, lower, upper = (frozen([joint[name] for joint in joints]) for name in ("q_star", "lower", "upper"))
         revolute = frozen([joint["kind"] == "revolute" for joint in joints], bool)
         space = Space(tuple(joint["name"] for joint in joints), q_star, lower, upper, revolute)
         names = ("id", "name", "hash", "geometries", "pairs", "warnings", "padding", "configurations")
-        return cls(space=space, not_covered=read(NotCovered, document["not_covered"]), **{name: document[name] for name in names})
+        asked = asked_as(document, given)
+        return cls(
+            space=space, asked=asked, not_covered=read(NotCovered, document["not_covered"]), **{name: document[name] for name in names}
+        )
 
 
 def scene_name(scene: str | Scene) -> str:
@@ -60,4 +69,4 @@ def scene_name(scene: str | Scene) -> str:
     Raises:
         CirisError: argument, for anything but a name, an id or a scene.
     """
-    return named(f"{scene.name}@{scene.id}" if isinstance(scene, Scene) else scene, "scene", "its name, its id or a ciris.Scene")
+    return named(scene.asked if isinstance(scene, Scene) else scene, "scene", "its name, its id or a ciris.Scene")

@@ -150,7 +150,7 @@ def _grow(args: Namespace) -> int:
     else:
         with service.connect(args.url) as client:
             scene = service.known_scene(client, args.scene)
-            grown = service.grow(client, {"kind": "grow", "scene": service.named(scene), **requests[0]}, screen, args.watch)
+            grown = service.grow(client, {"kind": "grow", "scene": scene["asked"], **requests[0]}, screen, args.watch)
             url = f"{client.url}/regions/{grown.region}"
     path = proof.write(grown.manifest["scene"]["name"], grown.proof)
     if args.json:
@@ -169,7 +169,7 @@ def _grow_many(args: Namespace, requests: list[Document], screen: Screen) -> int
         )
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)
-        jobs = service.grow_many(client, [{"kind": "grow", "scene": service.named(scene), **one} for one in requests], screen, args.watch)
+        jobs = service.grow_many(client, [{"kind": "grow", "scene": scene["asked"], **one} for one in requests], screen, args.watch)
         grown = {job["region"]: client.region(job["region"]) for job in jobs if job["region"]}
     if args.json:
         print_json(jobs)
@@ -309,11 +309,11 @@ def contains(args: Namespace) -> int:
     points = [configuration(text) for text in args.q]
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)
-        answer = client.contains(service.named(scene), points)
+        answer = client.contains(scene["asked"], points)
         outside = [(q, point) for q, point in zip(points, answer["points"], strict=True) if not point["inside"]]
         for i in range(0, len(outside), AT_ONCE):
             some = outside[i : i + AT_ONCE]
-            contacts = client.contacts(service.named(scene), [q for q, _ in some])["contacts"]
+            contacts = client.contacts(scene["asked"], [q for q, _ in some])["contacts"]
             for (_, point), contact in zip(some, contacts, strict=True):
                 point["trouble"] = contact["trouble"]
     inside = not outside

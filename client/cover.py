@@ -19,7 +19,7 @@ def cover(args: Namespace) -> int:
     asked, screen = request(args, COVER), Screen()
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)
-        job = service.run(client, {"kind": "cover", "scene": service.named(scene), **asked}, screen)
+        job = service.run(client, {"kind": "cover", "scene": scene["asked"], **asked}, screen)
         found = client.cover(job["id"])
     if args.json:
         print_json({"job": job["id"], "scene": scene["name"], **found})

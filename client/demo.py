@@ -19,6 +19,7 @@ from typing import Any
 import certifier
 from certifier.errors import CirisError, unreadable
 from certifier.outcome import DEADLINE
+from ciris.documents import asked_as
 from ciris.find import api_key, data_dir, running_stack
 from ciris.synchronous.client import Client
 from client import output, service
@@ -62,7 +63,7 @@ def _demonstrate(url: str) -> tuple[bool, str | None]:
         print(f"ciris is up at {url} (data: {data_dir()})")
         size = f"{scene['joints']} joints, {scene['geometries']} convex bodies, {scene['pairs']} pairs to separate"
         print(f"scene {scene['name']}: {size}", flush=True)
-        grown = _grown(client, {"kind": "grow", "scene": service.named(scene), "seed": {"q": seed_of(str(SCENE), None)}})
+        grown = _grown(client, {"kind": "grow", "scene": asked_as(scene, None), "seed": {"q": seed_of(str(SCENE), None)}})
     path = ProofFile(str(data_dir() / f"{file_name(scene['name'])}.proof")).write(scene["name"], grown.proof)
     print("\nevery pair of bodies:")
     output.print_pairs(grown.manifest["pairs"])

@@ -110,7 +110,7 @@ def _by_service(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)
         former = {} if args.former is None else {"former": args.former}
-        job = service.run(client, {"kind": "map", "scene": service.named(scene), **asked, **former}, Screen())
+        job = service.run(client, {"kind": "map", "scene": scene["asked"], **asked, **former}, Screen())
         return _written(client, job["id"], scene, args.out)
 
 

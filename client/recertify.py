@@ -56,7 +56,7 @@ def recertify(args: Namespace) -> int:
 
 
 def _request(asked: Document, scene: Document, region: str) -> Document:
-    return {"kind": "recertify", "scene": service.named(scene), "region": region, **asked}
+    return {"kind": "recertify", "scene": scene["asked"], "region": region, **asked}
 
 
 def _all(args: Namespace, asked: Document, screen: Screen) -> int:

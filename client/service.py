@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from certifier.errors import CirisError
 from certifier.outcome import Guarantee, Outcome
-from ciris.documents import Document
+from ciris.documents import Document, asked_as
 from ciris.find import api_key, service_url
 from ciris.job import why_no_region
 from ciris.synchronous.client import Client
@@ -51,21 +51,21 @@ def connect(url: str | None) -> Client:
 
 
 def known_scene(client: Client, scene: str) -> Document:
-    """Returns the scene of a scene file, which it uploads, or the scene with a name or id that the service knows."""
-    return client.add_scene(scene) if is_scene_file(scene) else client.scene(scene)
+    """Returns the scene of a scene file, which it uploads, or the scene with a name or id that the service knows.
+
+    ``asked`` in it is what requests call it.
+    """
+    found = client.add_scene(scene) if is_scene_file(scene) else client.scene(scene)
+    return {**found, "asked": asked_as(found, None if is_scene_file(scene) else scene)}
 
 
 def scene_name(client: Client, scene: str) -> str:
-    """Returns what a question calls a scene: ``NAME@ID`` for a scene file, which it uploads, or the name or id that was typed.
+    """Returns what a question calls a scene: as ``asked`` of :func:`known_scene`, or the name or id that was typed.
 
     The answer says if the service does not know it. So a name takes no request of its own.
     """
-    return named(known_scene(client, scene)) if is_scene_file(scene) else scene
-
-
-def named(scene: Document) -> str:
-    """Returns what a request calls a scene that the service described: this scene, with the named configurations of its name."""
-    return f"{scene['name']}@{scene['id']}"
+    asked: str = known_scene(client, scene)["asked"] if is_scene_file(scene) else scene
+    return asked
 
 
 def grow(client: Client, request: Document, screen: Screen, watch: bool = False, idempotency_key: str | None = None) -> Grown:
@@ -132,7 +132,7 @@ def certify(client: Client, scene: Document, given: PolytopeFile, asked: Documen
     body: dict[str, Any] = {"C": given.polytope.C.tolist(), "d": given.polytope.d.tolist()}
     if given.center is not None:
         body["center"] = given.center.tolist()
-    job, _ = client.create_job({"kind": "certify", "scene": named(scene), "polytope": body, **asked})
+    job, _ = client.create_job({"kind": "certify", "scene": scene["asked"], "polytope": body, **asked})
     screen.line(f"job {job['id']}: {client.url}/jobs/{job['id']}")
     job = _wait(client, job["id"], screen, watch)
     if job["outcome"] is None or (job["error"] and job["error"]["code"] not in NEGATIVE):

@@ -233,6 +233,8 @@ def _point(value: Any, where: str) -> tuple[float, float, float]:
 
 def _body(value: Any, where: str, scene: Scene) -> str:
     name = fields.string(value, where)
+    if scene.has_geometry(name):
+        raise fields.wrong(where, f"{name} is a geometry, and a body is needed", hint=f"name its body, {scene.geometry(name).body}")
     check_known(name, scene.bodies, where)
     return name
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from certifier.model import Scene
+from certifier.conditions import condition_named
+from certifier.model import Pair, Scene
 from certifier.seeding.free import Clearance, Nearest, named, nearest_free, written
 from certifier.seeding.limits import too_long
 from certifier.seeding.proposal import NO_ROOM
@@ -36,10 +37,16 @@ def hindrance(scene: Scene, checked: Sequence[Nearest]) -> str:
 
 def _next_to_contact(scene: Scene, tight: Nearest) -> str:
     assert tight.pair is not None
-    text = f"{named(tight.field)} is {1e3 * tight.distance:.3g} mm from contact of {tight.pair.a} and {tight.pair.b}{NO_ROOM}"
+    text = f"{named(tight.field)} is {1e3 * tight.distance:.3g} mm from {_end_of(tight.pair)}{NO_ROOM}"
     clearance, q = Clearance(scene), scene.in_windows(tight.q)
     found = ((room, nearest_free(scene, clearance, q, room, REACH)) for room in ROOM)
     room, roomy = next((known for known in found if known[1] is not None), (0.0, None))
     if roomy is None:
         return text
     return f"{text}; at q = {written(clearance, roomy, room)} every pair is {1e3 * room:g} mm apart or more"
+
+
+def _end_of(pair: Pair) -> str:
+    """Returns in words where a pair touches."""
+    condition = condition_named(pair.a, pair.b)
+    return f"contact of {pair.a} and {pair.b}" if condition is None else f"where the condition '{condition}' ends"

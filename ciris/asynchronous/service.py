@@ -171,11 +171,11 @@ class AsyncService:
 
     async def add_scene(self, path: str | Path) -> Scene:
         """Uploads a scene file with everything it refers to. It needs PyYAML and python-flint, which ``ciris[client]`` installs."""
-        return await self.scene((await self.client.add_scene(path))["id"])
+        return Scene.of(await self.client.add_scene(path))
 
     async def stage_scene(self, name: str, path: str | Path) -> Scene:
         """Uploads a scene file as the next version of a name. ``NAME@staged`` means it, and the name means what it did."""
-        return await self.scene((await self.client.stage_scene(name, path))["id"])
+        return Scene.of(await self.client.stage_scene(name, path))
 
     async def constrain_scene(self, scene: str | Scene, conditions: Sequence[Mapping[str, Any]], *, name: str) -> Scene:
         """Makes another scene out of one: the same, with more conditions. Everything that is asked of it keeps them.
@@ -201,7 +201,7 @@ class AsyncService:
 
     async def scene(self, name: str) -> Scene:
         """Returns a scene by its name or id."""
-        return Scene.of(await self.client.scene(name))
+        return Scene.of(await self.client.scene(name), name)
 
     async def warnings(self, scene: str | Scene) -> list[str]:
         """Returns what to know about a scene before trusting a certificate for it, in sentences."""

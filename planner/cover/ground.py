@@ -18,6 +18,8 @@ Collides = Callable[[Array], NDArray[np.bool_]]
 
 BATCH, BATCHES = 2000, 500
 """Number of configurations that are drawn together, and the largest number of draws."""
+EMPTY = 50
+"""Nothing more is drawn after so many draws without a free configuration."""
 LEVELS = 4
 """A line is tried at its middle, then at the middles of its halves, and so on, for this many levels."""
 
@@ -30,13 +32,15 @@ def free_samples(scene: Scene, collides: Collides, count: int, rng: np.random.Ge
     """
     found: list[Array] = []
     total = 0
-    for _ in range(BATCHES):
+    for batch in range(BATCHES):
+        if batch == EMPTY and not total:
+            break
         s = scene.to_s(rng.uniform(scene.q_lower, scene.q_upper, (BATCH, scene.n)))
         found.append(s[~collides(s)])
         total += len(found[-1])
         if total >= count:
             return np.concatenate(found)[:count]
-    message = f"of {BATCH * BATCHES} configurations, {total} were found that are free of collisions"
+    message = f"of {BATCH * len(found)} configurations, {total} were found that are free of collisions and keep the conditions"
     raise RegionError("nothing_free", message, field="scene", hint="`ciris scene check` says which bodies always touch")
 
 

@@ -112,6 +112,8 @@ def _close(state: CoverState, reason: str) -> Transition:
         return Transition(state, Watch(stop=True))
     if state.last is not None and reason != LATE:
         return _finish(state, state.last, reason)
+    if state.last is None and reason == LATE:
+        return Transition(state, Finish(False, f"{LATE} before the cover had looked at the scene", fruitless=True))
     return Transition(replace(state, looks=state.looks + 1), Scout())
 
 

@@ -322,6 +322,16 @@ def test_a_map_names_its_conditions(conditioned: Scene) -> None:
     assert sum(line.startswith("there, condition") for line in lines) == 3
 
 
+def test_near_the_surface_of_a_ball_it_is_not_said_that_the_condition_fails() -> None:
+    """The tip of the first slide's box is 2 m from the world's origin at 0, and 3 m minus a millimetre are allowed."""
+    scene = sliding(InBall("near", (), WORLD, (0.0, 0.0, 0.0), 3.0, points=(("arm/link2", (1.0, 0.0, 0.0)),)))
+    pair = next(pair for pair in scene.pairs if in_collision(replace(scene, pairs=(pair,)), scene.to_s(np.array([[0.5, 0.499]])))[0])
+    said = trouble(scene, pair, np.array([0.5, 0.499]))
+    assert said == "the condition 'near' cannot be proved: a point of arm/link2 is 1 mm from the surface of the ball, which is too near"
+    beyond = trouble(scene, pair, np.array([0.5, 0.501]))
+    assert beyond == "the condition 'near' is not kept: a point of arm/link2 reaches 1 mm beyond the zone"
+
+
 def test_a_seed_is_refused_with_the_angle_or_the_distance(conditioned: Scene) -> None:
     for name, q, words in (
         ("along-x", [1.5, 1.4], "the angle is 166.2 degrees, and 60 at most"),

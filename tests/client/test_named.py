@@ -65,6 +65,32 @@ def test_files_with_waypoints_have_names(ciris: Ciris, url: str, named: Scene, t
         assert problem in ciris("path", "slider", "--path", file, CIRIS_URL=url).error
 
 
+def test_an_id_means_no_single_name(ciris: Ciris, url: str, named: Scene, database: Database) -> None:
+    """Two names of one content have a home each. The id alone is refused, by every command and in Python."""
+    (joint,) = (joint.name for joint in named.moving)
+    with database.write() as session:
+        scene_id = scenes.add(session, replace(named, name="other", configurations={"home": {joint: 0.1}})).id
+    for command in (("contains", scene_id, "--q", "home"), ("grow", scene_id, "--q", "home"), ("map", scene_id, "--at", "home")):
+        refused = ciris(*command, CIRIS_URL=url)
+        assert "'home' means other positions under the scene's name" in refused.error, refused.stdout
+    assert ciris("contains", "other", "--q", "home", "--json", CIRIS_URL=url).json["points"][0]["inside"]
+    with python.connect(url) as service:
+        with pytest.raises(CirisError, match="means other positions"):
+            service.contains(service.scene(scene_id), "home")
+        for name, at in (("slider", -0.1), ("other", 0.1), (f"other@{scene_id}", 0.1)):
+            assert service.contains(service.scene(name), "home").margin == pytest.approx(service.contains(name, [at]).margin)
+
+
+def test_a_scene_is_deleted_by_name_only_if_it_has_no_other(ciris: Ciris, url: str, scene: Scene, database: Database) -> None:
+    with database.write() as session:
+        scene_id = scenes.add(session, replace(scene, name="shared")).id
+    refused = ciris("scene", "rm", "slider", CIRIS_URL=url)
+    assert (refused.status, "it is called shared as well" in refused.error) == (2, True)
+    assert ciris("scene", "show", "shared", "--json", CIRIS_URL=url).status == 0
+    assert ciris("scene", "rm", scene_id, CIRIS_URL=url).status == 0
+    assert ciris("scene", "show", "shared", CIRIS_URL=url).status == 2
+
+
 def test_the_python_client_takes_names(url: str, named: Scene) -> None:
     with python.connect(url) as service:
         assert service.scene("slider").configurations == {"home": {"model/slide": -0.1}, "away": {"model/slide": 0.15}}

@@ -90,6 +90,7 @@ def test_all_kinds_are_read(tmp_path: Path) -> None:
         ("inside: {what: [cup/cup], ball: {center: [0, 0, 0], radius: -1}}", "scene_field", "inside.ball.radius", "at least 0"),
         ("inside: {what: [cup/cup], ball: {radius: 1}}", "scene_field", "inside.ball.center", "point"),
         ("inside: {what: [{body: cup, point: [0, 0, 0]}], ball: {}}", "unknown_name", "inside.what[0].body", "cup"),
+        ("inside: {what: [{body: cup/cup/wall, point: [0, 0, 0]}], ball: {}}", "scene_field", "inside.what[0].body", "is a geometry"),
         ("inside: {what: [{body: cup/cup}], ball: {}}", "scene_field", "inside.what[0].point", "point"),
         ("range: {joints: {arm/elbow_joint: 1}}", "scene_field", "range", "either degrees"),
         ("range: {joints: {arm/elbow_joint: 1}, metres: [0]}", "scene_field", "range.metres", "two numbers in metres"),

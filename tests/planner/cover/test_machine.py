@@ -92,8 +92,11 @@ def test_whatever_is_reported_in_whatever_order_it_ends_and_says_why(data: st.Da
     assert isinstance(action, Finish), "it did not end"
     assert not state.growing
     assert len(set(asked)) == len(asked), "nothing is asked for twice"
-    assert state.last is not None
     assert action.reason
+    if state.last is None:
+        assert late
+        assert (action.reached, action.fruitless, state.begun) == (False, True, 0), "the deadline came before the first look"
+        return
     missing = unreached(options, state.last, state.moved or ())
     assert action.reached == (not missing)
     assert action.reached or all(text in action.reason for text in missing)
@@ -178,9 +181,16 @@ def test_the_deadline_stops_what_grows_and_looks_once_more() -> None:
     action = after(stopping.state, Ended({0: None}), seen(20)).action
     assert action == Finish(False, f"{LATE}; 20 % of the free configurations are covered, not 95 %")
     nothing = replace(seen(0), regions=0, components=())
-    empty = after(begin(CoverOptions()).state, Late(), nothing).action
+    empty = after(after(begin(CoverOptions()).state, nothing).state, Late(), nothing).action
     assert isinstance(empty, Finish)
     assert empty.fruitless, "it has no region"
+
+
+def test_a_deadline_before_the_first_look_ends_the_cover() -> None:
+    """A look may take minutes where hardly any configuration is free."""
+    assert after(begin(CoverOptions()).state, Late()).action == Finish(
+        False, f"{LATE} before the cover had looked at the scene", fruitless=True
+    )
 
 
 @pytest.mark.parametrize(
