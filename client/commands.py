@@ -8,7 +8,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from certifier.conditions import called, fails
+from certifier.conditions import called, condition_named, fails
 from certifier.errors import CirisError
 from certifier.outcome import Outcome
 from certifier.verify.decimals import at_most_mm, exactly
@@ -103,6 +103,7 @@ def scene_show(args: Namespace) -> int:
             output.seconds(p["seconds"]),
         )
         for p in pairs
+        if condition_named(p["a"], p["b"]) is None
     ]
     output.print_table(("pair", "padding", "frame", "Gram", "N", "forecast"), costs, right="padding Gram N forecast")
     for item in lint["substitutions"]:
