@@ -52,7 +52,8 @@ def test_every_view_of_a_job_that_has_expired_answers(client: TestClient, databa
     for name, (route, _) in operations(document).items():
         method, path = route.split(" ", 1)
         if method == "GET" and "{job_id}" in path and name != "stream_job_events":
-            answer = client.get(path.format(job_id=job, pair=0), params={"iteration": 0})
+            named = {parameter["name"] for parameter in document["paths"][path]["get"].get("parameters", [])}
+            answer = client.get(path.format(job_id=job, pair=0), params={"iteration": 0} if "iteration" in named else {})
             assert answer.status_code in (200, 404), f"{name}: {answer.status_code} {answer.text}"
     for path in (f"/jobs/{job}", f"/jobs/{job}/live", f"/regions/{region}", "/", "/scenes/slider"):
         assert client.get(path).status_code == 200, path

@@ -266,7 +266,7 @@ def test_a_collision_is_a_negative_answer_with_its_witness(ciris: Ciris, tmp_pat
     write(tmp_path / "all.npz", C=np.zeros((0, 2)), d=np.zeros(0))
     done = ciris("certify", PLANAR, "--polytope", "all.npz", "--local")
     assert done.status == 1
-    assert "collision of arm/lower/bar and obstacles/body/block at q = " in done.stdout
+    assert "arm/lower/bar and obstacles/body/block touch at q = " in done.stdout
     assert done.stdout.splitlines()[-1].startswith("planar-2dof: refuted, guarantee none")
 
 

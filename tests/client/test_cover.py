@@ -23,7 +23,7 @@ COVERAGE = {"value": 0.5, "stderr": 0.01, "samples": 100}
     ("arguments", "error"),
     [
         (["--connect", "0"], "--connect: at least two configurations can be connected, and one was given"),
-        (["--connect", "0", "--connect", "-0.2,1"], "--connect[1]: 2 numbers were given; slider has 1 joints"),
+        (["--connect", "0", "--connect", "-0.2,1"], "--connect[1]: 2 numbers were given; the scene has 1 joints"),
         (["--seed", "5"], "--seed[0][0]: joint model/slide is at 5, not between its limits -1 and 1"),
     ],
 )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from certifier.conditioned import BALL, condition_of, limit_of, with_conditions, without_conditions
-from certifier.conditions import Condition, Cone, Distance, Inside
+from certifier.conditions import Condition, Cone, Distance, InBall, Inside
 from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.partition import bodies
@@ -29,9 +29,11 @@ def alone(condition: Condition) -> Scene:
 
 
 LIMITS = [
-    replace(one, faces=one.faces[:1]) if isinstance(one, Inside) else one for one in scene().conditions if not isinstance(one, Distance)
+    replace(one, faces=one.faces[:1]) if isinstance(one, Inside) else one
+    for one in scene().conditions
+    if not isinstance(one, Distance | InBall)
 ]
-"""One face for each zone: the pairs of several faces are first tried together, as one volume."""
+"""One face for each zone, and no ball: the pairs of several faces are first tried together, as one volume."""
 
 
 @pytest.mark.parametrize("condition", LIMITS, ids=lambda one: one.name)

@@ -81,7 +81,7 @@ def scene() -> Scene:
             Inside("hood", (tip.name,), "arm/link1", ((0.0, 0.6, 0.8, 0.29), (1.0, 0.0, 0.0, 2.97))),
             Distance("clear", tip.name, post.name, 1.3),
             Range("sum", (("arm/joint1", 1), ("arm/joint2", -1), ("arm/joint3", 1)), -0.63, 0.63),
-            Inside("nose", (), "arm/link1", ((0.0, 0.0, 1.0, 0.05),), points=(("arm/link3", (0.75, 0.25, -0.5)),)),
+            Inside("nose", (), "arm/link1", ((0.0, 0.0, 1.0, -0.06),), points=(("arm/link3", (0.75, 0.25, -0.5)),)),
             InBall("reach", (tip.name,), WORLD, (-2.0, 0.0, 0.0), 5.15, points=(("arm/link3", (0.8, 0.0, 0.0)),)),
         ],
     )
@@ -196,7 +196,8 @@ def larger(parts: Parts, rng: Rng) -> None:
     """A condition that is a little wider or narrower."""
     step = float(rng.choice([-1, 1]) * 10.0 ** rng.uniform(-12, -0.5))
     one = chosen(rng, parts.conditions)
-    at = {"cone": (one, "angle"), "distance": (one, "metres"), "range": (one, chosen(rng, ["lower", "upper"]))}.get(one["kind"])
+    numbers = {"cone": "angle", "distance": "metres", "range": chosen(rng, ["lower", "upper"]), "ball": "radius"}
+    at = (one, numbers[one["kind"]]) if one["kind"] in numbers else None
     node, key = at or (chosen(rng, one["faces"]), 3)
     node[key] += step
 

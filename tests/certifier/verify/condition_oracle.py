@@ -163,6 +163,8 @@ def _distance(bodies: Bodies, a: str, b: str, metres: str) -> np.ndarray:
 
 def _range(bodies: Bodies, total: str, lower: str, upper: str) -> np.ndarray:
     joints = re.findall(rf"([+-]) {_NAME}", total if total[0] in "+-" else f"+ {total}")
+    if not {name for _, name in joints} <= bodies.moving.keys():
+        return np.full(len(bodies.q), np.inf)  # it is about no joint
     angle = sum((1 if sign == "+" else -1) * bodies.q[:, bodies.moving[name]["index"]] for sign, name in joints)
     middle, half = np.radians([(float(upper) + float(lower)) / 2, (float(upper) - float(lower)) / 2])
     off = angle - middle
