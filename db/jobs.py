@@ -15,7 +15,7 @@ from certifier.errors import CirisError
 from certifier.outcome import Outcome
 from db import clock, events, labels, leases, pages, traces, webhooks
 from db.ids import found
-from db.models import GrowthRow, JobRow, PairRow, SceneRow, StepRow
+from db.models import GrowthRow, JobRow, SceneRow, StepRow
 from db.pages import Page
 from db.session import insert_new
 from db.settings import settings
@@ -358,10 +358,9 @@ def undecided(session: Session, limit: int) -> Sequence[str]:
     return session.scalars(query.limit(limit)).all()
 
 
-def untouched(session: Session, job: JobRow) -> bool:
-    """Says whether no worker has claimed any of the job's work yet."""
-    claimed = (exists().where(model.job_id == job.id, model.attempts > 0) for model in (StepRow, PairRow))
-    return not session.scalar(select(or_(*claimed)))
+def untouched(job: JobRow) -> bool:
+    """Says whether no solver has claimed any of the job's work yet."""
+    return job.claimed_at is None
 
 
 def to_end(session: Session, now: datetime) -> list[str]:

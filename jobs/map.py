@@ -131,7 +131,7 @@ class Map(Kind):
 
     def is_late(self, session: Session, job: JobRow, now: datetime) -> bool:
         """Says whether the deadline ends the job. A process that leads it, or has, gets some time to end it by itself."""
-        return super().is_late(session, job, now) and (super().is_late(session, job, now - GRACE) or jobs.untouched(session, job))
+        return super().is_late(session, job, now) and (super().is_late(session, job, now - GRACE) or jobs.untouched(job))
 
     def stop(self, session: Session, job: JobRow, afterwards: Afterwards) -> None:
         """Has what was found until now stored."""

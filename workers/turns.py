@@ -103,7 +103,7 @@ def _save(turn: Turn, decision: Any | CirisError) -> bool:
 
 def _late(session: Session, kind: Kind, job: JobRow) -> Finish:
     """Returns the end of a job that is late. Where no worker has begun with it, that is an error."""
-    if not jobs.untouched(session, job):
+    if not jobs.untouched(job):
         return kind.late(session, job)
     error = not_begun()
     job.error = error.to_document()

@@ -8,8 +8,10 @@ import sys
 import numpy as np
 
 from ciris import Space, connect
+from db import scenes
 from tests.client.conftest import PLANAR
 from tests.errors.trial import Table, Trial
+from tests.scenes import slider
 
 EYE = [[1, 0], [0, 1], [-1, 0], [0, -1]]
 
@@ -41,6 +43,15 @@ def beside_a_seed(t: Trial, seed: str) -> None:
 def asked(t: Trial, *arguments: str) -> None:
     """Runs a command that asks the service."""
     t.ciris(*arguments, CIRIS_URL=t.need("url"))
+
+
+def shared(t: Trial) -> None:
+    """Deletes a scene by one of its two names."""
+    t.need("scene")
+    with t.need("database").write() as session:
+        scenes.add(session, slider())
+        scenes.add(session, slider("other"))
+    asked(t, "scene", "rm", "slider")
 
 
 def to_a_terminal(t: Trial) -> None:
@@ -92,6 +103,7 @@ COMMANDS: Table = {
     ("wrong_length", "q"): [lambda t: one_joint().to_s([0.1, 0.2])],
     ("unreachable", ""): [lambda t: t.ciris("scene", "ls", CIRIS_URL="http://127.0.0.1:9")],
     ("not_found", ""): [lambda t: asked(t, "job", "show", "..")],
+    ("has_names", "SCENE"): [lambda t: shared(t)],
     ("job_not_found", "job"): [lambda t: asked(t, "job", "show", "nothing")],
     ("bad_number", "--q[1]"): [lambda t: grow(t, "--q", "0,x")],
     ("bad_number", "--q"): [lambda t: grow(t, "--q", ",")],

@@ -66,7 +66,6 @@ TESTED = {
     "client/map.py:_former": "tests/client/test_map.py",
     "client/planning.py:_goal": "tests/client/test_planning.py",
     "client/planning.py:plan": "tests/client/test_planning.py",
-    "client/removal.py:scene_rm": "tests/client/test_named.py",
     "db/backup.py:_check_empty": "tests/db/test_backup.py",
     "db/backup.py:_check_rows": "tests/db/test_backup.py",
     "db/backup.py:_check_whole": "tests/db/test_backup.py",
