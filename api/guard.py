@@ -1,4 +1,5 @@
-"""The guard stands before all routes: it checks where a request comes from, its length, its key, and how often the caller asks.
+"""The guard stands before all routes: it checks where a request comes from, its length, its encoding and its key, and how often the
+caller asks.
 
 The service on the loopback interface has no keys unless somebody makes one. So a web page that the user's browser shows must not
 be able to talk to the service, in either of two ways: under a name of its own that resolves to this machine, or with a form that
@@ -76,6 +77,7 @@ class Guard:
             _check_url(scope)
             self._check_origin(scope["method"], headers)
             _check_length(headers, limit)
+            _check_encoding(headers)
             await self._check_caller(scope, headers)
         except (CirisError, *UNAVAILABLE) as error:
             await self._respond(Request(scope), error)(scope, receive, send)
@@ -147,6 +149,14 @@ def _check_length(headers: Headers, limit: int) -> None:
     length = headers.get("content-length", "")
     if length.isdigit() and int(length) > limit:
         raise CirisError("too_large", _too_large(limit), field="body", hint="send less")
+
+
+def _check_encoding(headers: Headers) -> None:
+    """Refuses a body that is said to be compressed: a small one could become larger than any limit."""
+    given = headers.get("content-encoding", "identity")
+    if given.lower() != "identity":
+        hint = "send it as it is, without Content-Encoding"
+        raise CirisError("content_encoding", f"the service does not unpack bodies in {given!a}", field="Content-Encoding", hint=hint)
 
 
 def _counted(receive: Receive, limit: int) -> Receive:

@@ -14,7 +14,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
-from certifier.errors import CirisError
+from certifier.errors import CirisError, shortened
 from certifier.options import in_group
 from db.disk import lacks_room
 from db.session import UNAVAILABLE
@@ -51,6 +51,7 @@ _STATUS_OF_CODE = {
     **dict.fromkeys(("storage_quota", "too_many_keys", "workers_shared"), HTTPStatus.FORBIDDEN),
     "ambiguous_id": HTTPStatus.CONFLICT,
     "too_large": HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+    "content_encoding": HTTPStatus.UNSUPPORTED_MEDIA_TYPE,
     "bundle_too_large": HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
     **dict.fromkeys(("child_timeout", "child_memory", "child_died"), HTTPStatus.SERVICE_UNAVAILABLE),
     "cross_site": HTTPStatus.FORBIDDEN,
@@ -164,7 +165,8 @@ def respond(render: Render, request: Request, error: Exception) -> Response:
 
 def _validation(error: RequestValidationError) -> Problem:
     found = error.errors()
-    problems = [FieldProblem(field=_field((*e["loc"], "kind") if e["type"] in _TAGS else e["loc"]), message=_sentence(e)) for e in found]
+    places = [_field((*e["loc"], "kind") if e["type"] in _TAGS else e["loc"]) for e in found]
+    problems = [FieldProblem(field=shortened(at), message=shortened(_sentence(e))) for at, e in zip(places, found, strict=True)]
     if any(e["type"] == "json_invalid" for e in found):
         return problem_of(CirisError("malformed_json", "the body is not JSON", field="body", hint=_DESCRIBED))
     if isinstance(error.body, bytes):

@@ -14,10 +14,12 @@ import json
 import os
 import shutil
 import sqlite3
+import stat
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from sqlalchemy import JSON, Connection, DateTime, LargeBinary, MetaData, Select, Table, Text, cast, create_engine, insert, inspect, select
 from sqlalchemy.engine import make_url
@@ -27,6 +29,7 @@ from certifier.errors import CirisError, unreadable
 from certifier.model import hash_of
 from db import migrate, version
 from db.session import Database, make_directory
+from db.settings import sqlite_url
 from db.types import Utc
 
 _FORGET_WORKERS = "DELETE FROM workers"
@@ -34,7 +37,7 @@ _PART_BYTES = 2**20
 _ROWS, _LARGE_ROWS = 500, 1
 """This many rows are in memory at once; of tables with files, which may have 100 MB each, the second number."""
 _FIELD = "FILE"
-_APPLICATION, _APPLICATION_AT = 0x43495249, 68
+_APPLICATION, _APPLICATION_AT, _HEAD_BYTES = 0x43495249, 68, 72
 """The number of files that have a digest, "CIRI" in ASCII, and where SQLite's format has it."""
 _SEAL = b"\nciris backup; sha256 of what stands before this line: "
 _SEAL_BYTES = len(_SEAL) + 65
@@ -46,7 +49,7 @@ def backup(url: str, path: Path) -> str:
     Raises:
         CirisError: file_exists, unwritable, database_version; damaged_backup, when what was read is not whole.
     """
-    if path.exists():
+    if os.path.exists(path):
         kind = "directory" if path.is_dir() else "file"
         raise CirisError("file_exists", f"there is a {kind} {path} already", field=_FIELD, hint="name a file that is not there yet")
     database = Database(url)
@@ -92,8 +95,8 @@ def _backup_postgresql(database: Database, partial: Path) -> str:
     with snapshot.begin() as source:
         source.exec_driver_sql("SET LOCAL idle_in_transaction_session_timeout = 0")  # the file's disk may take its time
         revision = _known(source)
-        migrate.upgrade(f"sqlite:///{partial}", revision)
-        with migrate.connection_for_migrations(f"sqlite:///{partial}") as target:
+        migrate.upgrade(sqlite_url(partial), revision)
+        with migrate.connection_for_migrations(sqlite_url(partial)) as target:
             _copy(source, target)
             for table, last in _last_ids(source).items():
                 target.exec_driver_sql("UPDATE sqlite_sequence SET seq = ? WHERE name = ?", (last, table))
@@ -102,8 +105,8 @@ def _backup_postgresql(database: Database, partial: Path) -> str:
 
 def _restore_sqlite(path: Path, place: Path) -> None:
     make_directory(place.parent)
-    _check_empty(not place.with_name(f"{place.name}-wal").exists(), f"{place}-wal")
-    _check_empty(not place.exists() or _has_no_tables(place), str(place))
+    _check_empty(not os.path.exists(f"{place}-wal"), f"{place}-wal")
+    _check_empty(not os.path.exists(place) or _has_no_tables(place), str(place))
     with _new_file(place) as partial:
         shutil.copyfile(path, partial)
         if sealed(partial):
@@ -114,10 +117,15 @@ def _restore_sqlite(path: Path, place: Path) -> None:
             file.commit()
 
 
+def _open(path: Path, how: str) -> sqlite3.Connection:
+    """Opens a file that is there, as SQLite's URIs say how. No character of its path has a meaning in the URI."""
+    return sqlite3.connect(f"file:{quote(os.fsencode(path.absolute()))}?{how}", uri=True)
+
+
 def _has_no_tables(place: Path) -> bool:
     """Says whether an SQLite database that has no log has no tables, or only the empty one that `ciris db downgrade base` leaves."""
     try:
-        with closing(sqlite3.connect(f"file:{place}?immutable=1", uri=True)) as there:
+        with closing(_open(place, "immutable=1")) as there:
             tables = {name for (name,) in there.execute("SELECT name FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'")}
             return not tables or (tables == {version.TABLE} and not there.execute(f"SELECT 1 FROM {version.TABLE}").fetchone())
     except sqlite3.DatabaseError:
@@ -126,7 +134,7 @@ def _has_no_tables(place: Path) -> bool:
 
 def _restore_postgresql(url: str, path: Path, revision: str) -> None:
     """Makes the tables and fills them, in one transaction. Keys to other rows are checked at its end, as rows may refer to later ones."""
-    source_engine = create_engine(f"sqlite:///file:{path.absolute()}?mode=ro&uri=true")
+    source_engine = create_engine("sqlite://", creator=lambda: _open(path, "mode=ro"))
     try:
         with source_engine.connect() as source, migrate.connection_for_migrations(url) as target:
             target.exec_driver_sql("SET LOCAL idle_in_transaction_session_timeout = 0")
@@ -244,9 +252,10 @@ def _check_seal(path: Path) -> None:
     with path.open("rb") as file:
         left = path.stat().st_size - _SEAL_BYTES
         if not sealed(path):
-            file.seek(_APPLICATION_AT)
-            if file.read(4) == _APPLICATION.to_bytes(4, "big"):
-                raise _damaged(path, "its end is missing")
+            head = file.read(_HEAD_BYTES)
+            if head[_APPLICATION_AT:] == _APPLICATION.to_bytes(4, "big"):
+                more = left - _bytes_of_pages(head)
+                raise _damaged(path, f"{more} bytes stand behind its end" if more > 0 else "its end is missing")
             return
         digest = hashlib.sha256()
         while left > 0 and (part := file.read(min(left, _PART_BYTES))):
@@ -256,6 +265,12 @@ def _check_seal(path: Path) -> None:
             raise _damaged(path, "its content has another digest than when it was written")
 
 
+def _bytes_of_pages(head: bytes) -> int:
+    """Returns how long the pages of SQLite are together, as the head of the file says."""
+    size, count = int.from_bytes(head[16:18], "big"), int.from_bytes(head[28:32], "big")
+    return count * (2**16 if size == 1 else size)
+
+
 def _check_whole(path: Path) -> str:
     """Returns the revision of a backup that is as it was written.
 
@@ -263,9 +278,12 @@ def _check_whole(path: Path) -> str:
         CirisError: not_a_backup, damaged_backup, database_version.
     """
     try:
+        mode = path.stat().st_mode
+        if not stat.S_ISREG(mode):
+            raise _not_a_backup(f"{path} is {'a directory' if stat.S_ISDIR(mode) else 'no regular file'}")
         _check_seal(path)
     except OSError as error:
-        raise CirisError("not_a_backup", f"{path}: {unreadable(error)}", field=_FIELD, hint="name a file of `ciris db backup`") from None
+        raise _not_a_backup(f"{path}: {unreadable(error)}") from None
     return _check_content(path)
 
 
@@ -276,7 +294,7 @@ def _check_content(path: Path) -> str:
         CirisError: not_a_backup, damaged_backup, database_version.
     """
     try:
-        with closing(sqlite3.connect(f"file:{path.absolute()}?mode=ro", uri=True)) as file:
+        with closing(_open(path, "mode=ro")) as file:
             return _check_rows(file, path)
     except sqlite3.DatabaseError as error:
         raise _damaged(path, str(error)) from None
@@ -284,7 +302,7 @@ def _check_content(path: Path) -> str:
 
 def _check_rows(file: sqlite3.Connection, path: Path) -> str:
     if not file.execute("SELECT 1 FROM sqlite_master WHERE name = ?", (version.TABLE,)).fetchone():
-        raise CirisError("not_a_backup", f"{path} has no tables of ciris", field=_FIELD, hint="name a file of `ciris db backup`")
+        raise _not_a_backup(f"{path} has no tables of ciris")
     revision = file.execute(f"SELECT version_num FROM {version.TABLE}").fetchone()
     if revision is None or revision[0] not in version.revisions():
         raise version.refusal(revision and revision[0])
@@ -310,6 +328,10 @@ def _hash_of_scene(document: str) -> str | None:
         return None
 
 
+def _not_a_backup(problem: str) -> CirisError:
+    return CirisError("not_a_backup", problem, field=_FIELD, hint="name a file of `ciris db backup`")
+
+
 def _damaged(path: Path, why: str) -> CirisError:
     return CirisError("damaged_backup", f"{path} is not whole: {why}", field=_FIELD, hint="take another backup; nothing was changed")
 
@@ -323,7 +345,8 @@ def _new_file(path: Path) -> Iterator[Path]:
     """
     partial = path.with_name(f"{path.name}.partial")
     try:
-        os.close(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600))
+        partial.unlink(missing_ok=True)  # of a run that was killed
+        os.close(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
         try:
             yield partial
             _to_disk(partial)

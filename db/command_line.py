@@ -84,6 +84,8 @@ def path(text: str) -> Path:
     """Returns the path that an argument names."""
     if not text:
         raise argparse.ArgumentTypeError("an empty text names nothing")
+    if text != os.fsencode(text).decode(errors="replace"):
+        raise argparse.ArgumentTypeError(f"{text!a} is no UTF-8, which SQLite's files need to be called in")
     return Path(text)
 
 

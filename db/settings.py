@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
-from sqlalchemy.engine import make_url
+from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError
 
 from certifier.errors import CirisError
@@ -81,6 +81,11 @@ def _database_url(given: str) -> str:
     if parsed.database in (None, "", ":memory:"):
         raise ValueError(f"it names no database; {forms}")
     return given
+
+
+def sqlite_url(path: Path) -> str:
+    """Returns the URL of an SQLite database. What a URL gives a meaning to, such as a question mark in the path, is escaped in it."""
+    return str(URL.create("sqlite", database=str(path)))
 
 
 LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
@@ -167,7 +172,7 @@ class Settings(BaseSettings):
     @property
     def database(self) -> str:
         """Returns the database's URL, with the default filled in."""
-        return self.database_url or f"sqlite:///{self.data_dir.expanduser().absolute() / 'ciris.sqlite3'}"
+        return self.database_url or sqlite_url(self.data_dir.expanduser().absolute() / "ciris.sqlite3")
 
     def placed(self, error: CirisError) -> CirisError:
         """Returns an error about the database with the setting in it that names the database here."""

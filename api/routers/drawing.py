@@ -11,10 +11,11 @@ from api.children import Children
 from api.libraries import KeptLibraries, Libraries
 from api.named import with_positions
 from api.schemas.drawing import ContactsRequest, ContactsResponse, SliceRequest, SliceResponse
+from api.strict import StrictRoute
 from db import scenes
 from db.session import Database
 
-router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ])
+router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ], route_class=StrictRoute)
 
 
 @router.post("/contacts")

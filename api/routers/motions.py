@@ -10,10 +10,11 @@ from api.access import SUBMIT, Db
 from api.children import Children, about_motions
 from api.named import with_positions
 from api.schemas.motions import MotionRequest, MotionResponse
+from api.strict import StrictRoute
 from db import scenes
 from db.session import Database
 
-router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[SUBMIT])
+router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[SUBMIT], route_class=StrictRoute)
 
 
 @router.post("/certify-path")

@@ -33,6 +33,7 @@ from api.schemas.planning import (
     SegmentRequest,
     SegmentResponse,
 )
+from api.strict import StrictRoute
 from certifier.model import Array, Scene
 from certifier.motion.splines import Curve, curve
 from db.session import Database
@@ -43,7 +44,7 @@ from planner.motion.space import Space
 from planner.nearest import nearest
 from planner.tubes import Tubes
 
-router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ])
+router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ], route_class=StrictRoute)
 
 
 @router.post("/contains")

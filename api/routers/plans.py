@@ -15,10 +15,11 @@ from api.links import KeptLinks
 from api.motions import KeptMotions
 from api.schemas.planning import MOTION
 from api.schemas.plans import PlanRequest, PlanResponse
+from api.strict import StrictRoute
 from certifier.proof.container import with_scene
 from db import motions, proofs, scenes
 
-router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ])
+router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ], route_class=StrictRoute)
 
 
 @router.post("/plan")

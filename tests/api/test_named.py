@@ -178,3 +178,12 @@ def test_a_scene_has_a_name_that_harms_nobody(client: TestClient, region: str, n
     refused = client.post("/v1/scenes/slider/constrain", json={"name": name, "conditions": [low]})
     assert (refused.status_code, refused.json()["field"]) == (422, "name"), refused.text
     assert "\x1b" not in refused.json()["detail"]
+
+
+def test_what_a_name_may_be_is_said_with_the_refusal(client: TestClient, region: str) -> None:
+    low = {"inside": {"what": [client.get("/v1/scenes/slider").json()["bodies"][-1]], "half_spaces": [[0, 0, 1, 9]]}}
+    for name, condition, field in (("low!", "low", "name"), ("low", "low!", "conditions[0].name")):
+        body = {"name": name, "conditions": [{"name": condition, **low}]}
+        problem = client.post("/v1/scenes/slider/constrain", json=body).json()
+        assert (problem["status"], problem["field"]) == (422, field)
+        assert problem["hint"].startswith("names have at most 200 ASCII letters, digits, ")

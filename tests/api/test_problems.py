@@ -1,5 +1,6 @@
 """Every error is problem+json, and other web sites are kept out."""
 
+import gzip
 import re
 from http import HTTPStatus
 from typing import Any
@@ -77,6 +78,66 @@ def test_no_route_of_the_interface_takes_an_unknown_parameter(client: TestClient
             assert (answer.status_code, problem["field"]) == (422, "misspelt"), (method, path)
             asked += 1
     assert asked > 50
+
+
+def test_a_parameter_that_has_one_value_is_not_given_twice(client: TestClient) -> None:
+    asked = 0
+    for path, operations in client.get("/openapi.json").json()["paths"].items():
+        for parameter in operations.get("get", {}).get("parameters", []):
+            if parameter["in"] != "query" or not path.startswith("/v1/"):
+                continue
+            name, several = parameter["name"], any(s.get("type") == "array" for s in _schemas(parameter["schema"]))
+            problem = client.get(re.sub(r"\{\w+\}", "1", path), params={name: ["1", "2"]}).json()
+            assert (problem.get("detail") == "is given more than once" and problem["field"] == name) != several, (path, name)
+            asked += 1
+    assert asked > 40
+
+
+def _schemas(schema: dict[str, Any]) -> list[dict[str, Any]]:
+    return [schema, *schema.get("anyOf", [])]
+
+
+def test_labels_may_be_several(client: TestClient) -> None:
+    assert client.get("/v1/jobs", params={"label": ["a=1", "b=2"]}).json()["jobs"] == []
+
+
+@pytest.mark.parametrize("encoding", ["gzip", "br", "GZIP", "gzip, br"])
+def test_a_body_that_is_compressed_is_refused_for_that(client: TestClient, encoding: str) -> None:
+    answer = client.post(
+        "/v1/jobs", content=gzip.compress(b"{}"), headers={"Content-Encoding": encoding, "Content-Type": "application/json"}
+    )
+    problem = answer.json()
+    assert (answer.status_code, problem["code"], problem["field"]) == (415, "content_encoding", "Content-Encoding")
+    assert problem["hint"] == "send it as it is, without Content-Encoding"
+    assert client.post("/v1/jobs", json={}, headers={"Content-Encoding": "identity"}).status_code == 422
+
+
+def test_no_route_takes_the_last_of_two_values_with_one_key(client: TestClient) -> None:
+    asked = 0
+    for path, operations in client.get("/openapi.json").json()["paths"].items():
+        for method, operation in operations.items():
+            if "application/json" not in operation.get("requestBody", {}).get("content", {}):
+                continue
+            body = '{"a": [{"b": {"\\u0063": 1, "d": 2, "c": 3}}]}'
+            headers = {"Content-Type": "application/json"}
+            answer = client.request(method, re.sub(r"\{\w+\}", "1", path), content=body, headers=headers)
+            problem = answer.json()
+            assert (answer.status_code, problem["detail"]) == (422, "an object has the key 'c' twice"), (method, path)
+            assert (problem["code"], problem["field"], problem["hint"]) == ("invalid_request", "body", "leave one of them out")
+            asked += 1
+    assert asked > 10
+
+
+def test_no_answer_repeats_a_long_name_whole(client: TestClient) -> None:
+    long = "x" * 5000
+    for answer in (
+        client.get(f"/v1/scenes/{long}"),
+        client.get(f"/v1/jobs/{long}"),
+        client.get("/v1/jobs", params={long: "1"}),
+        client.post("/v1/jobs", json={"kind": "grow", long: 1}),
+    ):
+        assert answer.status_code in (404, 422)
+        assert "x" * 1000 not in answer.text
 
 
 def test_every_wrong_field_is_listed(client: TestClient) -> None:

@@ -150,6 +150,14 @@ def test_a_directory_that_cannot_be_made_is_refused_in_one_line() -> None:
     assert done.stderr.count("\n") == 1
 
 
+def test_a_name_that_is_no_text_is_refused_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for words in (["--data", "a\udcff", "upgrade"], ["--data", str(tmp_path), "backup", "a\udcff"]):
+        with pytest.raises(SystemExit) as ended:
+            commands.main(words)
+        said = capsys.readouterr().err
+        assert (ended.value.code, said.count("\n"), "is no UTF-8" in said) == (2, 1, True)
+
+
 BAD_URLS = {
     "nonsense": "it is no URL of a database",
     "mysql://ciris:hidden@127.0.0.1/ciris": "the service knows no database 'mysql'",

@@ -16,6 +16,7 @@ from certifier.errors import CirisError
 from db import backup, jobs, leases, migrate, proofs, version, workers
 from db.models import EventRow, JobRow, ProofRow
 from db.session import Database
+from db.settings import Settings, sqlite_url
 from db.states import WorkerState
 from db.workers import Made, WorkerKind
 from tests.db.builders import a_job, a_running_job, add_region
@@ -128,6 +129,41 @@ def test_what_has_no_tables_any_more_is_restored_into(filled: str, other_url: st
     assert rows(file) == rows(again)
 
 
+@pytest.mark.parametrize("name", ["a b?c#d%20.db", "b1%41", "?", "file:x", "ü&mode=memory", "'"])
+def test_every_name_names_what_it_says(filled: str, other_url: str, tmp_path: Path, name: str) -> None:
+    """No character of a path has a meaning in SQLite's URIs or in the URL of a database."""
+    (place := tmp_path / f"in {name}").mkdir()
+    backup.backup(filled, place / name)
+    backup.restore(other_url, place / name)
+    assert os.listdir(place) == [name]
+    data = tmp_path / f"data {name}"
+    there = Settings(data_dir=data, database_url="").database
+    backup.restore(there, place / name)
+    assert os.listdir(data) == ["ciris.sqlite3"]
+    migrate.upgrade(there)
+    backup.backup(there, place / "again")
+    assert rows(place / name) == rows(place / "again")
+
+
+def test_a_name_that_no_disk_holds_is_refused(filled: str, tmp_path: Path) -> None:
+    file, long = tmp_path / "file", tmp_path / ("x" * 300)
+    backup.backup(filled, file)
+    for act, code in (
+        (lambda: backup.backup(filled, long), "unwritable"),
+        (lambda: backup.restore(filled, long), "not_a_backup"),
+        (lambda: backup.restore(sqlite_url(long), file), "unwritable"),
+    ):
+        with pytest.raises(CirisError, match="name too long") as refused:
+            act()
+        assert refused.value.code == code
+
+
+def test_a_pipe_where_a_killed_run_left_its_file_is_not_waited_for(filled: str, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "file.partial")
+    backup.backup(filled, tmp_path / "file")
+    assert [path.name for path in tmp_path.glob("file*")] == ["file"]
+
+
 def test_a_file_that_is_no_database_is_not_replaced(sqlite_url: str, tmp_path: Path) -> None:
     file, place = tmp_path / "file", tmp_path / "photos"
     backup.backup(sqlite_url, file)
@@ -207,6 +243,14 @@ def _half_of_an_old_file(path: Path) -> None:
     _cut(0.5)(path)
 
 
+def _replace_by(make: Callable[[Path], None]) -> Callable[[Path], None]:
+    def replace(path: Path) -> None:
+        path.unlink()
+        make(path)
+
+    return replace
+
+
 DOCUMENT = "UPDATE scenes SET document = replace(document, '\"padding\"', '\"paddinG\"')"
 
 
@@ -219,11 +263,13 @@ DAMAGES: dict[str, tuple[Callable[[Path], Any], str, str]] = {
     "half a file of an older version": (_half_of_an_old_file, "damaged_backup", "is not whole"),
     "a file without its last byte": (_cut_by(1), "damaged_backup", "its end is missing"),
     "a file without its digest": (_cut_by(backup._SEAL_BYTES), "damaged_backup", "its end is missing"),
-    "a file with something behind it": (lambda path: path.open("a").write("x"), "damaged_backup", "its end is missing"),
+    "a file with something behind it": (lambda path: path.open("a").write("xy"), "damaged_backup", "2 bytes stand behind its end"),
     "a flipped bit of the digest": (_flip(1.0), "damaged_backup", "another digest"),
     **{f"a flipped bit at {i}/16": (_flip(i / 16.01), "damaged_backup", "another digest") for i in range(16)},
     "another file": (lambda path: path.write_bytes(b"no database at all" * 100), "damaged_backup", "is not whole"),
     "no file": (lambda path: path.unlink(), "not_a_backup", "no such file"),
+    "a directory": (_replace_by(os.mkdir), "not_a_backup", "is a directory"),
+    "a pipe": (_replace_by(os.mkfifo), "not_a_backup", "is no regular file"),
     "an empty file": (lambda path: path.write_bytes(b""), "not_a_backup", "has no tables"),
     "a later version": (_change("UPDATE alembic_version SET version_num = '9999'"), "database_version", "9999"),
 }
