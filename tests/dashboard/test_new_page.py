@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import shlex
 import subprocess
 import sys
@@ -22,9 +23,11 @@ from api.schemas.jobs import Job
 from certifier.model import Scene
 from certifier.options import option
 from db import scenes
+from db.keys import Scope
 from db.session import Database
 from db.states import JobState
 from jobs.grow import Grow
+from tests.dashboard.test_project_page import made
 from tests.dashboard.test_truth import until
 
 REFUSED = "Failed to load resource: the server responded with a status of "
@@ -198,7 +201,7 @@ def test_the_form_the_command_curl_and_python_ask_for_the_same_job(
     with subprocess.Popen([sys.executable, "-m", "client.cli", *arguments], stderr=subprocess.PIPE) as command:
         until(lambda: len(jobs(client)) == 2)
         command.terminate()
-    subprocess.run(["sh", "-c", texts["curl"].replace(' -H "Authorization: Bearer $CIRIS_API_KEY"', "")], check=True, capture_output=True)
+    subprocess.run(["sh", "-c", texts["curl"]], check=True, capture_output=True)
     exec(texts["Python"].replace(".wait()", ""), {})
     others = jobs(client)[:3]
     assert len(jobs(client)) == 4
@@ -206,6 +209,41 @@ def test_the_form_the_command_curl_and_python_ask_for_the_same_job(
     for other in others:
         assert [other[name] for name in same] == [mine[name] for name in same]
         assert lasts(other) == pytest.approx(lasts(mine)) == 120
+
+
+def test_who_is_signed_in_copies_curl_with_the_key(page: Any, url: str, planar: Scene, database: Database) -> None:
+    (key,) = made(database, ("somebody", Scope.SUBMIT, "default"))
+    page.set_extra_http_headers({"Authorization": f"Bearer {key}"})
+    page.goto(f"{url}/new?scene=planar&q=0.1,-0.2")
+    page.get_by_text("No collision (computed").wait_for()
+    text = copied(page, "curl")
+    subprocess.run(["sh", "-c", text], check=True, capture_output=True, env={**os.environ, "CIRIS_API_KEY": key})
+    page.goto(url)
+    page.get_by_role("cell", name="grow").wait_for()
+
+
+@pytest.mark.parametrize("kind", ["Certify a polytope", "Certify a region again"])
+def test_the_command_has_no_configurations_that_its_kind_does_not_take(opened: Any, kind: str) -> None:
+    opened.get_by_role("radio", name="Map the scene").check()
+    opened.get_by_role("button", name="Add this configuration").click()
+    assert "--at=0.1,-0.2" in copied(opened, "command")
+    opened.get_by_role("radio", name=kind).check()
+    assert "0.1,-0.2" not in copied(opened, "command")
+
+
+def test_a_configuration_is_added_once_and_a_motion_may_come_back_to_it(opened: Any) -> None:
+    opened.get_by_role("radio", name="Map the scene").check()
+    add, added = (opened.get_by_role("button", name=name) for name in ("Add this configuration", "This configuration is added"))
+    add.click()
+    assert added.is_disabled()
+    set_joint(opened, "arm/joint1", -30)
+    add.click()
+    opened.locator(".marks li button").first.click()
+    added.wait_for()
+    opened.get_by_role("radio", name="Certify a motion").check()
+    add.click()
+    added.wait_for()
+    assert opened.locator(".marks li").count() == 3
 
 
 def test_the_text_is_copied(opened: Any) -> None:

@@ -10,13 +10,19 @@ import { ChooseScene, type Scene } from "./choose";
 import type { Refused } from "./options";
 import { asked, type Start as First } from "./again";
 import { Copies } from "./copies";
-import { missing, request, type Parts, type Wish } from "./request";
+import { isMarked, missing, request, type Parts, type Wish } from "./request";
 import { Wishes } from "./wishes";
 import { asText, withUnits } from "../common/units";
 
 const TRIES = 100;
 
-export function NewIsland({ parts }: { parts: Parts }) {
+interface Props {
+  parts: Parts;
+  /** Whether the service knows who reads the page by a key. */
+  keyed: boolean;
+}
+
+export function NewIsland({ parts, keyed }: Props) {
   // The page rewrites its address, so it is read once. Its configuration is one of its scene, and of no other.
   const [first, setFirst] = useState<First | null>(null);
   const [scenes, setScenes] = useState<Scene[] | null>(null);
@@ -68,12 +74,12 @@ export function NewIsland({ parts }: { parts: Parts }) {
     <div class="new">
       <ChooseScene scenes={known} chosen={chosen} onChoose={choose} onUpload={take} />
       {problem && <p class="notice bad">{problem}</p>}
-      {model && model.scene === chosen && <Start model={model} parts={parts} first={first} key={model.scene} />}
+      {model && model.scene === chosen && <Start model={model} parts={parts} keyed={keyed} first={first} key={model.scene} />}
     </div>
   );
 }
 
-function Start({ model, parts, first }: { model: SceneModel; parts: Parts; first: First }) {
+function Start({ model, parts, keyed, first }: Props & { model: SceneModel; first: First }) {
   const names = useMemo(() => positions(model), [model]);
   const [q, setQ] = useState(() => within(model, read(first.q, model.q_star.length) ?? model.q_star));
   const [unread] = useState(() => first.q !== null && q.join() !== read(first.q, model.q_star.length)?.join());
@@ -167,10 +173,10 @@ function Start({ model, parts, first }: { model: SceneModel; parts: Parts; first
         </div>
       </div>
       <form onSubmit={(event) => void submit(event)}>
-        <Wishes wish={wish} parts={parts[wish.kind]} refused={refused} onWish={setWish} marks={wish.marks.map((mark) => asText(mark, model.units))} onMark={() => setWish({ ...wish, marks: [...wish.marks, q] })} onGo={(mark) => setQ(wish.marks[mark]!)} />
+        <Wishes wish={wish} parts={parts[wish.kind]} refused={refused} onWish={setWish} marks={wish.marks.map((mark) => asText(mark, model.units))} here={isMarked(wish, q)} onMark={() => setWish({ ...wish, marks: [...wish.marks, q] })} onGo={(mark) => setQ(wish.marks[mark]!)} />
         <div role="alert">{problem && <p class="notice bad">{problem}</p>}</div>
         <p><button type="submit" class="primary" disabled={sending}>{sending ? "Starting …" : "Start the job"}</button></p>
-        <Copies q={q} wish={wish} parts={parts} body={body} />
+        <Copies q={q} wish={wish} parts={parts} keyed={keyed} body={body} />
       </form>
     </div>
   );
