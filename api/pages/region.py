@@ -36,7 +36,7 @@ def compare_page(request: Request, a: str, b: str, db: Db) -> Response:
         "both": both,
         "least": [min((margin for margin in known.values() if margin is not None), default=None) for known in margins],
         "joints": [(name, [known.get(name) for known in joints]) for name in dict.fromkeys([*joints[0], *joints[1]])],
-        "pairs": [(pair, [known.get(pair) for known in margins]) for pair in dict.fromkeys([*margins[0], *margins[1]])],
+        "pairs": [(pair, [known.get(pair, "not covered") for known in margins]) for pair in dict.fromkeys([*margins[0], *margins[1]])],
     }
     return page(request, "compare.html", context)
 
