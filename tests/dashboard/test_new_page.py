@@ -22,7 +22,7 @@ from api.pages.remedies import remedies
 from api.schemas.jobs import Job
 from certifier.model import Scene
 from certifier.options import option
-from db import scenes
+from db import scenes, staging
 from db.keys import Scope
 from db.session import Database
 from db.states import JobState
@@ -77,9 +77,31 @@ def test_the_robot_takes_a_named_configuration_and_keeps_the_joints_that_it_leav
         )
     page.goto(f"{url}/new?scene=named&q=0.1,-0.2")
     page.get_by_label("Named configuration").select_option("arm/home")
-    page.wait_for_url("**/new?scene=*&q=0.1,-0.5")
+    page.wait_for_url("**/new?scene=named&q=0.1,-0.5")
     page.get_by_label("Named configuration").select_option("arm/far")
-    page.wait_for_url("**/new?scene=*&q=0.7,-0.5")
+    page.wait_for_url("**/new?scene=named&q=0.7,-0.5")
+
+
+def test_each_name_of_a_scene_is_offered_with_its_own_configurations(page: Any, url: str, planar: Scene, database: Database) -> None:
+    with database.write() as session:
+        for name in ("one", "two"):
+            scenes.add(session, replace(planar, name=name, configurations={f"{name}/home": {"arm/joint2": -0.5}}))
+        staging.stage(session, "one", replace(planar, padding=0.001))
+    page.goto(f"{url}/new?scene=one&q=0.1,-0.2")
+    select, named = page.get_by_label("Scene", exact=True), page.get_by_label("Named configuration")
+    named.wait_for()
+    assert "scene=one&" in page.url
+    offered = {option.partition(" ")[0] for option in select.locator("option").all_text_contents()}
+    assert offered == {"planar", "one", "two", "one@staged"}
+    assert named.locator("option").all_text_contents() == ["choose …", "one/home"]
+    select.select_option("two")
+    page.wait_for_url("**/new?scene=two&**")
+    named.locator("option", has_text="two/home").wait_for(state="attached")
+    select.select_option("one@staged")
+    page.wait_for_url("**/new?scene=one%40staged&**")
+    page.goto(f"{url}/new?scene={planar.hash[:16]}")
+    page.locator(".slider").first.wait_for()
+    assert select.input_value() == planar.hash[:16]
 
 
 def test_what_touches_is_said_live_and_no_job_starts_there(opened: Any, client: TestClient) -> None:
@@ -108,7 +130,7 @@ def test_the_configuration_of_the_address_is_for_its_scene_only(opened: Any, pla
         scenes.add(session, other)
     opened.reload()
     opened.get_by_label("Scene", exact=True).select_option(label=f"other · 2 joints, {len(other.pairs)} pairs · {other.hash[:8]}")
-    opened.wait_for_url(f"**/new?scene={other.hash[:16]}&q=0,0")
+    opened.wait_for_url("**/new?scene=other&q=0,0")
     assert opened.get_by_text("The address does not name").count() == 0
 
 
