@@ -321,6 +321,8 @@ def test_what_a_kind_of_job_needs_is_asked_for(opened: Any, client: TestClient) 
         opened.get_by_role("radio", name=kind).check()
         opened.get_by_role("button", name="Start the job").click()
         opened.get_by_text(words).wait_for()
+        opened.get_by_role("radio", name="Grow one region").check()
+        opened.get_by_text(words).wait_for(state="detached")
     assert jobs(client) == []
     opened.get_by_role("radio", name="Certify a polytope").check()
     opened.locator("#new-file").set_input_files({"name": "bad.json", "mimeType": "application/json", "buffer": b"[]"})

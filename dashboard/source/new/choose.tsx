@@ -54,7 +54,7 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
         <select id="new-scene" value={chosen ?? ""} onChange={(event) => onChoose(event.currentTarget.value)} disabled={offers.length === 0}>
           {offers.length === 0 && <option value="">none yet</option>}
           {offers.map(({ id, name, joints, pairs }) => (
-            <option value={name} key={name}>{`${name} · ${joints} joint${joints === 1 ? "" : "s"}, ${pairs} pairs · ${id.slice(0, 8)}`}</option>
+            <option value={name} key={name}>{`${name} · ${joints} joint${joints === 1 ? "" : "s"}, ${pairs} pair${pairs === 1 ? "" : "s"} · ${id.slice(0, 8)}`}</option>
           ))}
         </select>
       </p>

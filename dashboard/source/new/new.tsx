@@ -101,6 +101,11 @@ function Start({ given, model, parts, keyed, first }: Props & { given: string; m
     );
   }, [given]);
 
+  // What was wrong with the wish may be right now.
+  const change = (next: Wish): void => {
+    setWish(next);
+    setProblem(null);
+  };
   const search = async (): Promise<void> => {
     const drawn = Array.from({ length: TRIES }, () => model.q_lower.map((low, i) => low + (model.q_upper[i]! - low) * Math.random()));
     try {
@@ -173,7 +178,7 @@ function Start({ given, model, parts, keyed, first }: Props & { given: string; m
         </div>
       </div>
       <form onSubmit={(event) => void submit(event)}>
-        <Wishes wish={wish} parts={parts[wish.kind]} refused={refused} onWish={setWish} marks={wish.marks.map((mark) => asText(mark, model.units))} here={isMarked(wish, q)} onMark={() => setWish({ ...wish, marks: [...wish.marks, q] })} onGo={(mark) => setQ(wish.marks[mark]!)} />
+        <Wishes wish={wish} parts={parts[wish.kind]} refused={refused} onWish={change} marks={wish.marks.map((mark) => asText(mark, model.units))} here={isMarked(wish, q)} onMark={() => change({ ...wish, marks: [...wish.marks, q] })} onGo={(mark) => setQ(wish.marks[mark]!)} />
         <div role="alert">{problem && <p class="notice bad">{problem}</p>}</div>
         <p><button type="submit" class="primary" disabled={sending}>{sending ? "Starting …" : "Start the job"}</button></p>
         <Copies q={q} wish={wish} parts={parts} keyed={keyed} body={body} />
