@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from certifier.conditions import condition_named
 from certifier.outcome import Guarantee, Outcome
 
 _RESULT = ("outcome", "margin", "seconds", "stage", "witness_q", "detail")
@@ -32,5 +33,11 @@ def document(
         "outcome": outcome.value,
         "guarantee": guarantee.value,
         "seconds": seconds,
-        "pairs": [{**{key: pair[key] for key in ("a", "b", *_RESULT)}, "proved_distance": pair["margin"]} for pair in pairs],
+        "pairs": [_pair(pair) for pair in pairs],
     }
+
+
+def _pair(pair: dict[str, Any]) -> dict[str, Any]:
+    """Returns a pair's entry. What stands for a condition has no distance in metres."""
+    distance = pair["margin"] if condition_named(pair["a"], pair["b"]) is None else None
+    return {**{key: pair[key] for key in ("a", "b", *_RESULT)}, "margin": distance, "proved_distance": distance}

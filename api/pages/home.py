@@ -7,11 +7,12 @@ from typing import Annotated, Any, Literal
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request, Response
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel
 
 from api.access import Db
 from api.pages.job import elapsed
 from api.pages.rendering import page
+from api.parameters import KNOWN_TO_PAGE
 from api.routers import regions, scenes
 from api.routers.jobs import described
 from api.schemas.jobs import JobKind
@@ -33,8 +34,6 @@ router = APIRouter()
 class Chosen(BaseModel):
     """Says which jobs somebody wants to see. A form sends an empty text for what nobody has chosen."""
 
-    model_config = ConfigDict(extra="ignore")
-
     state: JobState | Literal["active", "ended", ""] = ""
     kind: JobKind | Literal[""] = ""
     outcome: Outcome | Literal[""] = ""
@@ -45,12 +44,12 @@ class Chosen(BaseModel):
     before: Annotated[str, Query(max_length=200)] = ""
 
 
-@router.get("/")
+@router.get("/", dependencies=[KNOWN_TO_PAGE])
 def jobs_page(request: Request, db: Db, chosen: Annotated[Chosen, Query()]) -> Response:
     return page(request, "jobs.html", _home(db, chosen))
 
 
-@router.get("/live")
+@router.get("/live", dependencies=[KNOWN_TO_PAGE])
 def jobs_live(request: Request, db: Db, chosen: Annotated[Chosen, Query()]) -> Response:
     return page(request, "jobs_live.html", _home(db, chosen))
 

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Request, Response
 
 from api.access import Db, Reader
 from api.pages.rendering import page
+from api.parameters import KNOWN_TO_PAGE
 from api.room import KeptRoom, Room
 from api.routers import project
 from api.schemas.common import Cursor
@@ -17,12 +18,12 @@ from db.session import Database
 router = APIRouter()
 
 
-@router.get("/project")
+@router.get("/project", dependencies=[KNOWN_TO_PAGE])
 def project_page(request: Request, caller: Reader, db: Db, room: KeptRoom, after: Cursor = None) -> Response:
     return page(request, "project.html", _project(caller, db, room, after))
 
 
-@router.get("/project/live")
+@router.get("/project/live", dependencies=[KNOWN_TO_PAGE])
 def project_live(request: Request, caller: Reader, db: Db, room: KeptRoom, after: Cursor = None) -> Response:
     return page(request, "project_live.html", _project(caller, db, room, after))
 

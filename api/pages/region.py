@@ -9,6 +9,7 @@ from fastapi import APIRouter, Request, Response
 
 from api.access import Db
 from api.pages.rendering import page
+from api.parameters import KNOWN_TO_PAGE
 from api.routers import regions
 from api.schemas.regions import RegionDetail
 
@@ -26,7 +27,7 @@ def region_page(request: Request, region_id: str, db: Db) -> Response:
     return page(request, "region.html", context)
 
 
-@router.get("/compare")
+@router.get("/compare", dependencies=[KNOWN_TO_PAGE])
 def compare_page(request: Request, a: str, b: str, db: Db) -> Response:
     """Shows two regions side by side. Joints and pairs are matched by their names, so the scenes may differ."""
     both = [regions.get_region(region, db) for region in (a, b)]
@@ -36,7 +37,7 @@ def compare_page(request: Request, a: str, b: str, db: Db) -> Response:
         "both": both,
         "least": [min((margin for margin in known.values() if margin is not None), default=None) for known in margins],
         "joints": [(name, [known.get(name) for known in joints]) for name in dict.fromkeys([*joints[0], *joints[1]])],
-        "pairs": [(pair, [known.get(pair) for known in margins]) for pair in dict.fromkeys([*margins[0], *margins[1]])],
+        "pairs": [(pair, [known.get(pair, "not covered") for known in margins]) for pair in dict.fromkeys([*margins[0], *margins[1]])],
     }
     return page(request, "compare.html", context)
 

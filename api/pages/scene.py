@@ -9,6 +9,7 @@ from fastapi import APIRouter, Query, Request, Response
 
 from api.access import Db
 from api.pages.rendering import page
+from api.parameters import KNOWN_TO_PAGE
 from api.routers import regions, scenes
 from api.schemas.common import Cursor
 from api.schemas.scenes import SceneSummary
@@ -21,7 +22,7 @@ router = APIRouter()
 Sought = Annotated[str, Query(max_length=200, pattern=patterns.ANY)]
 
 
-@router.get("/scenes")
+@router.get("/scenes", dependencies=[KNOWN_TO_PAGE])
 def scenes_page(request: Request, db: Db, after: Cursor = None, before: Cursor = None, search: Sought = "") -> Response:
     with db.read() as session:
         found, total = known_scenes.page(session, after, 100, before, search or None), known_scenes.count(session, search or None)

@@ -9,6 +9,7 @@ from fastapi import APIRouter, Request, Response
 
 from api.access import Db, Reader
 from api.pages.rendering import page
+from api.parameters import KNOWN_TO_PAGE
 from api.routers import workers
 from api.schemas.common import Cursor
 from api.schemas.workers import Worker
@@ -19,12 +20,12 @@ from db.states import WorkerState
 router = APIRouter()
 
 
-@router.get("/workers")
+@router.get("/workers", dependencies=[KNOWN_TO_PAGE])
 def workers_page(request: Request, caller: Reader, db: Db, after: Cursor = None) -> Response:
     return page(request, "workers.html", _crew(caller, db, after))
 
 
-@router.get("/workers/live")
+@router.get("/workers/live", dependencies=[KNOWN_TO_PAGE])
 def workers_live(request: Request, caller: Reader, db: Db, after: Cursor = None) -> Response:
     return page(request, "workers_live.html", _crew(caller, db, after))
 

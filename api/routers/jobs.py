@@ -42,6 +42,7 @@ from api.schemas.progress import JobWorkers, Obstacle, Obstacles
 from api.schemas.scenes import PairInfo
 from api.schemas.service import Dependents
 from api.writing import writing
+from certifier.conditions import condition_named
 from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Stage
@@ -374,7 +375,9 @@ def _cell(scene: Scene, parts: Sequence[PairRow]) -> PairCell:
     distances, seconds, cells = (
         [value for part in parts if (value := getattr(part, name)) is not None] for name in ("margin", "seconds", "open_cells")
     )
-    proved = min(distances) if distances and state is PairState.CERTIFIED else None
+    pair = scene.pairs[row.pair_index]  # What stands for a condition has no distance in metres.
+    certified = state is PairState.CERTIFIED and condition_named(pair.a, pair.b) is None
+    proved = min(distances) if distances and certified else None
     return PairCell(
         iteration=row.iteration,
         pair=row.pair_index,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import shlex
 import subprocess
 import sys
@@ -21,10 +22,12 @@ from api.pages.remedies import remedies
 from api.schemas.jobs import Job
 from certifier.model import Scene
 from certifier.options import option
-from db import scenes
+from db import scenes, staging
+from db.keys import Scope
 from db.session import Database
 from db.states import JobState
 from jobs.grow import Grow
+from tests.dashboard.test_project_page import made
 from tests.dashboard.test_truth import until
 
 REFUSED = "Failed to load resource: the server responded with a status of "
@@ -74,9 +77,31 @@ def test_the_robot_takes_a_named_configuration_and_keeps_the_joints_that_it_leav
         )
     page.goto(f"{url}/new?scene=named&q=0.1,-0.2")
     page.get_by_label("Named configuration").select_option("arm/home")
-    page.wait_for_url("**/new?scene=*&q=0.1,-0.5")
+    page.wait_for_url("**/new?scene=named&q=0.1,-0.5")
     page.get_by_label("Named configuration").select_option("arm/far")
-    page.wait_for_url("**/new?scene=*&q=0.7,-0.5")
+    page.wait_for_url("**/new?scene=named&q=0.7,-0.5")
+
+
+def test_each_name_of_a_scene_is_offered_with_its_own_configurations(page: Any, url: str, planar: Scene, database: Database) -> None:
+    with database.write() as session:
+        for name in ("one", "two"):
+            scenes.add(session, replace(planar, name=name, configurations={f"{name}/home": {"arm/joint2": -0.5}}))
+        staging.stage(session, "one", replace(planar, padding=0.001))
+    page.goto(f"{url}/new?scene=one&q=0.1,-0.2")
+    select, named = page.get_by_label("Scene", exact=True), page.get_by_label("Named configuration")
+    named.wait_for()
+    assert "scene=one&" in page.url
+    offered = {option.partition(" ")[0] for option in select.locator("option").all_text_contents()}
+    assert offered == {"planar", "one", "two", "one@staged"}
+    assert named.locator("option").all_text_contents() == ["choose …", "one/home"]
+    select.select_option("two")
+    page.wait_for_url("**/new?scene=two&**")
+    named.locator("option", has_text="two/home").wait_for(state="attached")
+    select.select_option("one@staged")
+    page.wait_for_url("**/new?scene=one%40staged&**")
+    page.goto(f"{url}/new?scene={planar.hash[:16]}")
+    page.locator(".slider").first.wait_for()
+    assert select.input_value() == planar.hash[:16]
 
 
 def test_what_touches_is_said_live_and_no_job_starts_there(opened: Any, client: TestClient) -> None:
@@ -105,7 +130,7 @@ def test_the_configuration_of_the_address_is_for_its_scene_only(opened: Any, pla
         scenes.add(session, other)
     opened.reload()
     opened.get_by_label("Scene", exact=True).select_option(label=f"other · 2 joints, {len(other.pairs)} pairs · {other.hash[:8]}")
-    opened.wait_for_url(f"**/new?scene={other.hash[:16]}&q=0,0")
+    opened.wait_for_url("**/new?scene=other&q=0,0")
     assert opened.get_by_text("The address does not name").count() == 0
 
 
@@ -198,7 +223,7 @@ def test_the_form_the_command_curl_and_python_ask_for_the_same_job(
     with subprocess.Popen([sys.executable, "-m", "client.cli", *arguments], stderr=subprocess.PIPE) as command:
         until(lambda: len(jobs(client)) == 2)
         command.terminate()
-    subprocess.run(["sh", "-c", texts["curl"].replace(' -H "Authorization: Bearer $CIRIS_API_KEY"', "")], check=True, capture_output=True)
+    subprocess.run(["sh", "-c", texts["curl"]], check=True, capture_output=True)
     exec(texts["Python"].replace(".wait()", ""), {})
     others = jobs(client)[:3]
     assert len(jobs(client)) == 4
@@ -206,6 +231,41 @@ def test_the_form_the_command_curl_and_python_ask_for_the_same_job(
     for other in others:
         assert [other[name] for name in same] == [mine[name] for name in same]
         assert lasts(other) == pytest.approx(lasts(mine)) == 120
+
+
+def test_who_is_signed_in_copies_curl_with_the_key(page: Any, url: str, planar: Scene, database: Database) -> None:
+    (key,) = made(database, ("somebody", Scope.SUBMIT, "default"))
+    page.set_extra_http_headers({"Authorization": f"Bearer {key}"})
+    page.goto(f"{url}/new?scene=planar&q=0.1,-0.2")
+    page.get_by_text("No collision (computed").wait_for()
+    text = copied(page, "curl")
+    subprocess.run(["sh", "-c", text], check=True, capture_output=True, env={**os.environ, "CIRIS_API_KEY": key})
+    page.goto(url)
+    page.get_by_role("cell", name="grow").wait_for()
+
+
+@pytest.mark.parametrize("kind", ["Certify a polytope", "Certify a region again"])
+def test_the_command_has_no_configurations_that_its_kind_does_not_take(opened: Any, kind: str) -> None:
+    opened.get_by_role("radio", name="Map the scene").check()
+    opened.get_by_role("button", name="Add this configuration").click()
+    assert "--at=0.1,-0.2" in copied(opened, "command")
+    opened.get_by_role("radio", name=kind).check()
+    assert "0.1,-0.2" not in copied(opened, "command")
+
+
+def test_a_configuration_is_added_once_and_a_motion_may_come_back_to_it(opened: Any) -> None:
+    opened.get_by_role("radio", name="Map the scene").check()
+    add, added = (opened.get_by_role("button", name=name) for name in ("Add this configuration", "This configuration is added"))
+    add.click()
+    assert added.is_disabled()
+    set_joint(opened, "arm/joint1", -30)
+    add.click()
+    opened.locator(".marks li button").first.click()
+    added.wait_for()
+    opened.get_by_role("radio", name="Certify a motion").check()
+    add.click()
+    added.wait_for()
+    assert opened.locator(".marks li").count() == 3
 
 
 def test_the_text_is_copied(opened: Any) -> None:
@@ -261,6 +321,8 @@ def test_what_a_kind_of_job_needs_is_asked_for(opened: Any, client: TestClient) 
         opened.get_by_role("radio", name=kind).check()
         opened.get_by_role("button", name="Start the job").click()
         opened.get_by_text(words).wait_for()
+        opened.get_by_role("radio", name="Grow one region").check()
+        opened.get_by_text(words).wait_for(state="detached")
     assert jobs(client) == []
     opened.get_by_role("radio", name="Certify a polytope").check()
     opened.locator("#new-file").set_input_files({"name": "bad.json", "mimeType": "application/json", "buffer": b"[]"})

@@ -222,3 +222,20 @@ def test_lists_pages_and_the_api_say_what_a_job_does(client: TestClient, running
         text = client.get(path).text
         assert '<span class="badge queued">queued: no worker</span>' in text
         assert ">running</span>" not in text
+
+
+@pytest.mark.parametrize("path", ["/", "/live", "/scenes", "/workers", "/workers/live", "/project", "/project/live", "/compare"])
+def test_a_list_refuses_a_parameter_that_it_does_not_have(client: TestClient, path: str) -> None:
+    """A misspelt filter would list everything. Every page may say in which unit angles are."""
+    answer = client.get(f"{path}?sate=failed", headers={"Accept": "text/html"})
+    assert answer.status_code == 422
+    assert "there is no parameter &#39;sate&#39; here" in answer.text
+    if path != "/compare":
+        assert client.get(f"{path}?angles=rad").status_code == 200
+        assert client.get(path).status_code == 200
+
+
+def test_the_list_of_jobs_says_which_filter_was_meant(client: TestClient) -> None:
+    answer = client.get("/?sate=failed", headers={"Accept": "text/html"})
+    assert "state" in answer.text.partition("</h1>")[2]
+    assert client.get("/?state=failed&kind=&scene=&outcome=&key=&search=").status_code == 200

@@ -50,6 +50,30 @@ def test_sliders_stay_inside_the_region(opened: Any, planar: Scene, faces: tuple
     assert (d - C @ planar.to_s(shown(opened))).min() > -2e-3
 
 
+def test_a_number_outside_the_region_is_not_taken_without_a_word(opened: Any) -> None:
+    field = opened.get_by_role("spinbutton", name="arm/joint1, degrees, as a number")
+    held = opened.locator(".sliders").get_by_role("status")
+    for typed in ("60", "999"):
+        field.fill(typed)
+        field.press("Enter")
+        held.get_by_text(f"and not at {typed}.0°.").wait_for()
+        assert f"so it is at {field.input_value()}°" in held.text_content()
+        assert held.text_content().startswith("arm/joint1 may be between ")
+    opened.get_by_role("slider", name="arm/joint1, degrees").press("Home")
+    until(lambda: held.text_content() == "")
+    end = field.input_value()
+    field.fill("0")
+    field.press("Enter")
+    field.fill(end)
+    field.press("Enter")
+    until(lambda: field.input_value() == end)
+    assert held.text_content() == "", "the end as it is shown"
+
+
+def test_one_region_is_not_counted(client: TestClient, planar_region: str) -> None:
+    assert "in the certified region of this scene" in client.get("/scenes/planar").text
+
+
 def test_the_claim_stays_in_view_and_names_what_it_does_not_cover(opened: Any, client: TestClient, url: str, planar_region: str) -> None:
     """One box says what is proved, of how many pairs, not of which, how far they are apart, and when and by what it was verified."""
     region = client.get(f"/v1/regions/{planar_region}").json()

@@ -21,30 +21,44 @@ export function Sliders({ names, units, lower, upper, q, onChange, allowed, mark
   const short = shortNames(names);
   const latest = useRef(q);
   latest.current = q;
+  /** Why a number that was typed was not taken as it is. */
+  const [held, setHeld] = useState<string | null>(null);
+  const range = (index: number): [number, number] => allowed?.[index] ?? [lower[index]!, upper[index]!];
+  const inWords = (index: number): string => `${names[index]} may be between ${range(index).map((end) => shown(end, units[index]!)).join(" and ")}`;
   const set = (index: number, text: string): void => {
     const value = Number(text) * SHOWN[units[index]!].scale;
+    setHeld(null);
     if (text === "" || !Number.isFinite(value)) return;
-    const [low, high] = allowed?.[index] ?? [lower[index]!, upper[index]!];
+    const [low, high] = range(index);
     latest.current = latest.current.map((old, i) => (i === index ? Math.min(Math.max(value, low), high) : old));
     onChange(latest.current);
+  };
+  const enter = (index: number, text: string): void => {
+    set(index, text);
+    if (text === "") return;
+    // An end is typed as it is shown, which is rounded.
+    const wanted = shown(Number(text) * SHOWN[units[index]!].scale, units[index]!);
+    const now = shown(latest.current[index]!, units[index]!);
+    if (wanted !== now) setHeld(`${inWords(index)}${allowed ? " here" : ""}, so it is at ${now} and not at ${wanted}.`);
   };
   return (
     <div class="sliders">
       {names.map((name, i) => {
         const { scale, digits, sign, word: unit } = SHOWN[units[i]!];
-        const range = { min: lower[i]! / scale, max: upper[i]! / scale, step: "any" };
+        const limits = { min: lower[i]! / scale, max: upper[i]! / scale, step: "any" };
         return (
-          <div class={marked.includes(i) ? "slider marked" : "slider"} key={name} title={allowed && `${name} may be between ${shown(allowed[i]![0], units[i]!)} and ${shown(allowed[i]![1], units[i]!)}`}>
+          <div class={marked.includes(i) ? "slider marked" : "slider"} key={name} title={allowed && inWords(i)}>
             <span class="name" title={name}>{short[i]}</span>
             <span class="track">
               {allowed && <span class="allowed" aria-hidden="true" style={band(allowed[i]!, lower[i]!, upper[i]!)} />}
-              <input type="range" {...range} value={q[i]! / scale} aria-label={`${name}, ${unit}`} onInput={(event) => set(i, event.currentTarget.value)} />
+              <input type="range" {...limits} value={q[i]! / scale} aria-label={`${name}, ${unit}`} onInput={(event) => set(i, event.currentTarget.value)} />
             </span>
-            <NumberField range={range} text={(q[i]! / scale).toFixed(digits)} label={`${name}, ${unit}, as a number`} onEnter={(text) => set(i, text)} />
+            <NumberField range={limits} text={(q[i]! / scale).toFixed(digits)} label={`${name}, ${unit}, as a number`} onEnter={(text) => enter(i, text)} />
             <span class="unit" aria-hidden="true">{sign.trim()}</span>
           </div>
         );
       })}
+      <p class="small" role="status">{held}</p>
     </div>
   );
 }

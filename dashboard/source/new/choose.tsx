@@ -2,21 +2,32 @@
 import { useState } from "preact/hooks";
 import { said, upload } from "../common/api";
 import { packed } from "../common/zip";
-import type { SceneDetail } from "../common/schema";
+import type { SceneDetail, SceneModel } from "../common/schema";
 
-export type Scene = Pick<SceneDetail, "id" | "name" | "joints" | "pairs" | "warnings">;
+export type Scene = Pick<SceneDetail, "id" | "name" | "names" | "joints" | "pairs" | "warnings">;
 
 interface Props {
   scenes: Scene[];
+  /** A name or an id. */
   chosen: string | null;
-  onChoose: (id: string) => void;
+  /** The scene that is chosen; null until it is there. */
+  model: SceneModel | null;
+  onChoose: (scene: string) => void;
   onUpload: (scene: Scene) => void;
 }
 
-export function ChooseScene({ scenes, chosen, onChoose, onUpload }: Props) {
+/** What a scene is called: the name that it has or had last, where that still means it. */
+export function named({ id, name, names }: Scene): string {
+  return names.includes(name) ? name : (names[0] ?? id);
+}
+
+export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props) {
   const [sending, setSending] = useState<string | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
   const [added, setAdded] = useState<SceneDetail | null>(null);
+  const offers = scenes.flatMap((scene) => scene.names.map((name) => ({ ...scene, name })));
+  // An address may give a scene otherwise, such as by its id.
+  if (model && chosen !== null && !offers.some(({ name }) => name === chosen)) offers.unshift({ id: model.scene, name: chosen, names: [], joints: model.q_star.length, pairs: model.pairs.length, warnings: 0 });
   const send = async (files: File[]): Promise<void> => {
     if (files.length === 0) return;
     const name = files[0]!.webkitRelativePath.split("/")[0] || files[0]!.name;
@@ -40,10 +51,10 @@ export function ChooseScene({ scenes, chosen, onChoose, onUpload }: Props) {
     <div class="choose card" onDragOver={(event) => event.preventDefault()} onDrop={drop}>
       <p>
         <label for="new-scene">Scene</label>
-        <select id="new-scene" value={chosen ?? ""} onChange={(event) => onChoose(event.currentTarget.value)} disabled={scenes.length === 0}>
-          {scenes.length === 0 && <option value="">none yet</option>}
-          {scenes.map(({ id, name, joints, pairs }) => (
-            <option value={id} key={id}>{`${name} · ${joints} joint${joints === 1 ? "" : "s"}, ${pairs} pairs · ${id.slice(0, 8)}`}</option>
+        <select id="new-scene" value={chosen ?? ""} onChange={(event) => onChoose(event.currentTarget.value)} disabled={offers.length === 0}>
+          {offers.length === 0 && <option value="">none yet</option>}
+          {offers.map(({ id, name, joints, pairs }) => (
+            <option value={name} key={name}>{`${name} · ${joints} joint${joints === 1 ? "" : "s"}, ${pairs} pair${pairs === 1 ? "" : "s"} · ${id.slice(0, 8)}`}</option>
           ))}
         </select>
       </p>

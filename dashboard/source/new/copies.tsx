@@ -6,6 +6,8 @@ interface Props {
   q: number[];
   wish: Wish;
   parts: Parts;
+  /** Whether the service asks for keys. */
+  keyed: boolean;
   /** The body of the request. */
   body: Fields;
 }
@@ -30,7 +32,7 @@ export function Copies(props: Props) {
         {window.isSecureContext && <button type="button" onClick={() => void copy()}>{copied ? "Copied" : "Copy"}</button>}
       </p>
       <pre tabIndex={0}>{text}</pre>
-      <p class="small quiet">Joint positions are radians and metres. If the service has API keys, <code>CIRIS_API_KEY</code> holds yours.</p>
+      <p class="small quiet">Joint positions are radians and metres.{props.keyed && <> <code>CIRIS_API_KEY</code> holds your API key.</>}</p>
     </details>
   );
 }
@@ -57,14 +59,14 @@ function asCommand(props: Props): string {
   const list = (numbers: number[]): string => shell(numbers.join(","));
   const scene = String(body.scene);
   const marks = markName(wish);
-  const argument = { contain: "contain", at: "at", connect: "connect", seeds: "seed", q: "q" }[marks] ?? "";
+  const argument = { contain: "contain", at: "at", connect: "connect", seeds: "seed", q: "q" }[marks];
   const words = ["ciris", wish.kind];
   if (wish.kind === "recertify") words.push(shell(String(body.region) || "REGION"), "--scene", scene);
   else words.push(scene);
   if (wish.kind === "grow") words.push(`--q=${list(q)}`);
   if (wish.kind === "certify") words.push("--polytope", shell(wish.file?.name || "FILE"));
   if (wish.kind === "certify-path") words.push("--job", ...(wish.file ? ["--path", shell(wish.file.name || "FILE")] : []));
-  if (!wish.file) words.push(...wish.marks.map((mark) => `--${argument}=${list(mark)}`));
+  if (argument && !wish.file) words.push(...wish.marks.map((mark) => `--${argument}=${list(mark)}`));
   for (const [{ argument: name, takes }, value] of optionsOf(props)) {
     if (takes === "flag" || takes === "group") words.push(...(value === false ? [] : [`--${name}`]));
     else words.push(`--${name}=${shell(String(value))}`);
@@ -77,10 +79,10 @@ function asCommand(props: Props): string {
   return lacks.join("") + [...words, `--url=${location.origin}`].join(" ");
 }
 
-function asCurl({ body }: Props): string {
+function asCurl({ body, keyed }: Props): string {
   return [
     `curl -X POST ${location.origin}/v1/jobs \\`,
-    `  -H 'Content-Type: application/json' -H "Authorization: Bearer $CIRIS_API_KEY" \\`,
+    `  -H 'Content-Type: application/json'${keyed ? ' -H "Authorization: Bearer $CIRIS_API_KEY"' : ""} \\`,
     `  -d '${JSON.stringify(body).replaceAll("'", "'\\''")}'`,
   ].join("\n");
 }

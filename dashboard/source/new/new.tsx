@@ -6,22 +6,29 @@ import { MomentText, touchingOf, useMoment } from "../common/moment";
 import { Robot } from "../common/robot";
 import type { ContactsResponse, Job, PlanResponse, SceneDetail, SceneModel, ScenePage } from "../common/schema";
 import { Sliders } from "../common/sliders";
-import { ChooseScene, type Scene } from "./choose";
+import { ChooseScene, named, type Scene } from "./choose";
 import type { Refused } from "./options";
 import { asked, type Start as First } from "./again";
 import { Copies } from "./copies";
-import { missing, request, type Parts, type Wish } from "./request";
+import { isMarked, missing, request, type Parts, type Wish } from "./request";
 import { Wishes } from "./wishes";
 import { asText, withUnits } from "../common/units";
 
 const TRIES = 100;
 
-export function NewIsland({ parts }: { parts: Parts }) {
+interface Props {
+  parts: Parts;
+  /** Whether the service knows who reads the page by a key. */
+  keyed: boolean;
+}
+
+export function NewIsland({ parts, keyed }: Props) {
   // The page rewrites its address, so it is read once. Its configuration is one of its scene, and of no other.
   const [first, setFirst] = useState<First | null>(null);
   const [scenes, setScenes] = useState<Scene[] | null>(null);
+  // A scene is chosen as it is given: a name has configurations of its own, which an id has not.
   const [chosen, setChosen] = useState<string | null>(null);
-  const [model, setModel] = useState<SceneModel | null>(null);
+  const [found, setFound] = useState<{ given: string; model: SceneModel } | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
 
   useEffect(() => {
@@ -32,7 +39,7 @@ export function NewIsland({ parts }: { parts: Parts }) {
         const begin = asked(query, parts, job);
         setFirst(begin);
         setScenes(page.scenes);
-        setChosen(begin.scene ?? page.scenes[0]?.id ?? null);
+        setChosen(begin.scene ?? (page.scenes[0] && named(page.scenes[0])) ?? null);
       },
       (reason: unknown) => setProblem(said(reason)),
     );
@@ -42,10 +49,8 @@ export function NewIsland({ parts }: { parts: Parts }) {
     const stop = new AbortController();
     setProblem(null);
     get<SceneModel>(`/v1/scenes/${encodeURIComponent(chosen)}/model`, stop.signal).then(
-      (found) => {
-        if (stop.signal.aborted) return;
-        setModel(found);
-        setChosen(found.scene);
+      (model) => {
+        if (!stop.signal.aborted) setFound({ given: chosen, model });
       },
       (reason: unknown) => {
         if (!stop.signal.aborted) setProblem(said(reason));
@@ -55,25 +60,26 @@ export function NewIsland({ parts }: { parts: Parts }) {
   }, [chosen]);
 
   if (!scenes || !first) return <p class={problem ? "notice bad" : "empty"}>{problem ?? "Loading the scenes …"}</p>;
-  const known = model && !scenes.some(({ id }) => id === model.scene) ? [{ id: model.scene, name: model.name, joints: model.q_star.length, pairs: model.pairs.length, warnings: 0 }, ...scenes] : scenes;
+  const model = found?.given === chosen ? found.model : null;
   const choose = (scene: string): void => {
     setFirst((old) => old && { ...old, q: null });
     setChosen(scene);
   };
   const take = (scene: Scene): void => {
-    setScenes([scene, ...scenes.filter(({ id }) => id !== scene.id)]);
-    choose(scene.id);
+    // Its names may have meant other scenes until now.
+    setScenes([scene, ...scenes.filter(({ id }) => id !== scene.id).map((other) => ({ ...other, names: other.names.filter((name) => !scene.names.includes(name)) }))]);
+    choose(named(scene));
   };
   return (
     <div class="new">
-      <ChooseScene scenes={known} chosen={chosen} onChoose={choose} onUpload={take} />
+      <ChooseScene scenes={scenes} chosen={chosen} model={model} onChoose={choose} onUpload={take} />
       {problem && <p class="notice bad">{problem}</p>}
-      {model && model.scene === chosen && <Start model={model} parts={parts} first={first} key={model.scene} />}
+      {model && <Start given={chosen!} model={model} parts={parts} keyed={keyed} first={first} key={chosen} />}
     </div>
   );
 }
 
-function Start({ model, parts, first }: { model: SceneModel; parts: Parts; first: First }) {
+function Start({ given, model, parts, keyed, first }: Props & { given: string; model: SceneModel; first: First }) {
   const names = useMemo(() => positions(model), [model]);
   const [q, setQ] = useState(() => within(model, read(first.q, model.q_star.length) ?? model.q_star));
   const [unread] = useState(() => first.q !== null && q.join() !== read(first.q, model.q_star.length)?.join());
@@ -81,20 +87,25 @@ function Start({ model, parts, first }: { model: SceneModel; parts: Parts; first
   const [problem, setProblem] = useState<string | null>(null);
   const [refused, setRefused] = useState<Refused | null>(null);
   const [sending, setSending] = useState(false);
-  const [named, setNamed] = useState<SceneDetail["configurations"]>({});
+  const [configurations, setConfigurations] = useState<SceneDetail["configurations"]>({});
   const moment = useMoment(model.scene, q);
   const touching = useMemo(() => touchingOf(model, moment), [model, moment]);
   const body = request(model.scene, q, wish, parts);
 
-  useEffect(() => history.replaceState(null, "", withUnits(new URLSearchParams({ scene: model.scene, q: q.map((value) => Number(value.toFixed(4))).join(",") }))), [model, q.join()]);
+  useEffect(() => history.replaceState(null, "", withUnits(new URLSearchParams({ scene: given, q: q.map((value) => Number(value.toFixed(4))).join(",") }))), [model, q.join()]);
 
   useEffect(() => {
-    get<SceneDetail>(`/v1/scenes/${model.scene}`).then(
-      (scene) => setNamed(scene.configurations),
+    get<SceneDetail>(`/v1/scenes/${encodeURIComponent(given)}`).then(
+      (scene) => setConfigurations(scene.configurations),
       (reason: unknown) => setProblem(said(reason)),
     );
-  }, [model]);
+  }, [given]);
 
+  // What was wrong with the wish may be right now.
+  const change = (next: Wish): void => {
+    setWish(next);
+    setProblem(null);
+  };
   const search = async (): Promise<void> => {
     const drawn = Array.from({ length: TRIES }, () => model.q_lower.map((low, i) => low + (model.q_upper[i]! - low) * Math.random()));
     try {
@@ -152,12 +163,12 @@ function Start({ model, parts, first }: { model: SceneModel; parts: Parts; first
             <button type="button" onClick={() => setQ(within(model, model.q_star))}>Centre q*</button>
             <button type="button" onClick={() => void search()}>Random free one</button>
             {moment.trouble.length > 0 && <button type="button" onClick={() => void moveNear()}>Free one near by</button>}
-            {Object.keys(named).length > 0 && (
+            {Object.keys(configurations).length > 0 && (
               <label>
                 Named configuration{" "}
-                <select value="" onChange={(event) => setQ(within(model, names.map((joint, i) => named[event.currentTarget.value]?.[joint] ?? q[i]!)))}>
+                <select value="" onChange={(event) => setQ(within(model, names.map((joint, i) => configurations[event.currentTarget.value]?.[joint] ?? q[i]!)))}>
                   <option value="">choose …</option>
-                  {Object.keys(named).map((name) => (
+                  {Object.keys(configurations).map((name) => (
                     <option key={name}>{name}</option>
                   ))}
                 </select>
@@ -167,10 +178,10 @@ function Start({ model, parts, first }: { model: SceneModel; parts: Parts; first
         </div>
       </div>
       <form onSubmit={(event) => void submit(event)}>
-        <Wishes wish={wish} parts={parts[wish.kind]} refused={refused} onWish={setWish} marks={wish.marks.map((mark) => asText(mark, model.units))} onMark={() => setWish({ ...wish, marks: [...wish.marks, q] })} onGo={(mark) => setQ(wish.marks[mark]!)} />
+        <Wishes wish={wish} parts={parts[wish.kind]} refused={refused} onWish={change} marks={wish.marks.map((mark) => asText(mark, model.units))} here={isMarked(wish, q)} onMark={() => change({ ...wish, marks: [...wish.marks, q] })} onGo={(mark) => setQ(wish.marks[mark]!)} />
         <div role="alert">{problem && <p class="notice bad">{problem}</p>}</div>
         <p><button type="submit" class="primary" disabled={sending}>{sending ? "Starting …" : "Start the job"}</button></p>
-        <Copies q={q} wish={wish} parts={parts} body={body} />
+        <Copies q={q} wish={wish} parts={parts} keyed={keyed} body={body} />
       </form>
     </div>
   );

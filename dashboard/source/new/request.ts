@@ -59,6 +59,11 @@ export function markName({ kind, goal }: Wish): string {
   return { grow: "contain", map: "at", cover: goal === "connect" ? "connect" : "seeds", "certify-path": "q", certify: "", recertify: "" }[kind];
 }
 
+/** Whether a configuration is marked already. A motion may come back to one, but does not stay there. */
+export function isMarked({ kind, marks }: Wish, q: number[]): boolean {
+  return (kind === "certify-path" ? marks.slice(-1) : marks).some((mark) => mark.join() === q.join());
+}
+
 export function deadline({ minutes }: Wish): number | null {
   return minutes.trim() ? Number((60 * Number(minutes)).toPrecision(12)) : null;
 }

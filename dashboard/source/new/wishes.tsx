@@ -11,6 +11,8 @@ interface Props {
   onWish: (wish: Wish) => void;
   /** The configurations that were added, in words. */
   marks: string[];
+  /** Whether the configuration that is shown is one of them. */
+  here: boolean;
   onMark: () => void;
   onGo: (mark: number) => void;
 }
@@ -31,7 +33,7 @@ const MARKS = {
   "certify-path": ["Waypoints", "where there is no file; the motion is straight in q between them"],
 } as const;
 
-export function Wishes({ wish, parts, refused, onWish, marks, onMark, onGo }: Props) {
+export function Wishes({ wish, parts, refused, onWish, marks, here, onMark, onGo }: Props) {
   const { kind } = wish;
   const set = (part: Partial<Wish>): void => onWish({ ...wish, ...part });
   const about = kind === "certify" || kind === "recertify" ? null : MARKS[kind === "cover" ? wish.goal : kind];
@@ -80,7 +82,7 @@ export function Wishes({ wish, parts, refused, onWish, marks, onMark, onGo }: Pr
             ))}
           </ul>
         )}
-        <button type="button" onClick={onMark}>Add this configuration</button>
+        <button type="button" disabled={here} onClick={onMark}>{here ? "This configuration is added" : "Add this configuration"}</button>
       </div>}
       {Object.keys(wish.kept).length > 0 && <p class="notice">Kept from the earlier job: {Object.keys(wish.kept).join(", ")}. <button type="button" class="plain" onClick={() => set({ kept: {} })}>remove</button></p>}
       {rest.length > 0 && <details onInvalidCapture={(event) => void (event.currentTarget.open = true)}>

@@ -84,7 +84,7 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
     <section aria-labelledby="h-explore" class="explore">
       <h2 id="h-explore">Look inside</h2>
       <InClaim place="now">
-        <p role="status" class={inside ? "proved" : "inside not"}>{inside ? `The robot is inside the region: no collision of the ${bodies} covered pairs${kept}, as proved.` : "The robot is outside the region: nothing is proved here."}</p>
+        <p role="status" class={inside ? "proved" : "inside not"}>{inside ? `The robot is inside the region: no collision of the ${bodies === 1 ? "covered pair" : `${bodies} covered pairs`}${kept}, as proved.` : "The robot is outside the region: nothing is proved here."}</p>
       </InClaim>
       <div class="toolbar">
         <button type="button" aria-pressed={playing} onClick={() => setPlaying(!playing)}>{playing ? "Pause" : "Sweep through the region"}</button>
