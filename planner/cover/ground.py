@@ -19,7 +19,7 @@ Collides = Callable[[Array], NDArray[np.bool_]]
 BATCH, BATCHES = 2000, 500
 """Number of configurations that are drawn together, and the largest number of draws."""
 EMPTY = 50
-"""Nothing more is drawn after so many draws without a free configuration."""
+"""Nothing more is drawn after this many draws without a free configuration."""
 LEVELS = 4
 """A line is tried at its middle, then at the middles of its halves, and so on, for this many levels."""
 
