@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
-from certifier.configurations import full_names, is_known, positions
+from certifier.configurations import is_known, positions
 from certifier.errors import RegionError
 from certifier.model import Scene
 from db import scenes
@@ -51,11 +51,10 @@ def _has_names(value: Any) -> bool:
 
 def _filled(value: Any, scene: Scene, known: Known, field: str) -> Any:
     match value:
-        case NamedOrRegion() if not is_known(value, known.configurations) and _ID.fullmatch(value):
+        case NamedOrRegion() if not any(is_known(value, one) for one in known.of_names.values()) and _ID.fullmatch(value):
             return str(value)
         case Named():
-            _check_agree(value, known, field)
-            return positions(value, known.configurations, [joint.name for joint in scene.moving], scene.q_star.tolist(), field)
+            return _meant(value, scene, known, field)
         case BaseModel():
             changed = {
                 name: _filled(member, scene, known, f"{field}.{name}".removeprefix(".")) for name, member in value if _has_names(member)
@@ -67,14 +66,24 @@ def _filled(value: Any, scene: Scene, known: Known, field: str) -> Any:
             return value
 
 
-def _check_agree(text: str, known: Known, field: str) -> None:
-    """Refuses the names of configurations that are different ones under different names of the scene.
+def _meant(text: str, scene: Scene, known: Known, field: str) -> list[float]:
+    """Returns what names of configurations mean, (n,) in radians or metres: the same under all names of the scene that have them.
 
     Raises:
-        RegionError: ``configuration``.
+        RegionError: ``unknown_configuration``, ``configuration``.
     """
-    for name in full_names(text, known.configurations, field):
-        if name in known.clashing:
-            one, other = known.clashing[name]
-            message = f"{name!r} means other positions under the scene's name {one!r} than under {other!r}"
+    joints, q_star = [joint.name for joint in scene.moving], scene.q_star.tolist()
+    found: dict[str, list[float]] = {}
+    for name, configurations in (known.of_names or {"": {}}).items():
+        try:
+            found[name] = positions(text, configurations, joints, q_star, field)
+        except RegionError as error:
+            problem = error
+    if not found:
+        raise problem
+    (one, first), *others = found.items()
+    for other, second in others:
+        if second != first:
+            message = f"{text!r} means other positions under the scene's name {one!r} than under {other!r}"
             raise RegionError("configuration", message, field=field, hint="name the scene in the place of its id, or write NAME@ID")
+    return first

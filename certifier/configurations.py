@@ -42,15 +42,6 @@ def is_known(text: str, configurations: Configurations) -> bool:
     return all(name == Q_STAR or _fitting(name, configurations) for name in _names(text))
 
 
-def full_names(text: str, configurations: Configurations, field: str | None = None) -> list[str]:
-    """Returns the full names of the configurations that a text of names stands for, without ``q_star``.
-
-    Raises:
-        RegionError: ``unknown_configuration``.
-    """
-    return [_full(name, configurations, field) for name in _names(text) if name != Q_STAR]
-
-
 def positions(
     text: str, configurations: Configurations, joints: Sequence[str], q_star: Sequence[float], field: str | None = None
 ) -> list[float]:

@@ -36,18 +36,20 @@ class Known:
 
     Attributes:
         name: the name that was given, or the one that the scene was last added or staged under.
-        configurations: what each name means.
-        clashing: names of configurations that mean one thing under one name of the scene, and another thing under the other.
+        of_names: the named configurations by the name of the scene; those of one name, where one was given.
     """
 
     name: str
-    configurations: Configurations
-    clashing: Mapping[str, tuple[str, str]]
+    of_names: Mapping[str, Configurations]
 
     @property
     def agreed(self) -> dict[str, dict[str, float]]:
-        """Returns those that do not clash."""
-        return {name: dict(positions) for name, positions in self.configurations.items() if name not in self.clashing}
+        """Returns the configurations that mean the same under all names that have them."""
+        found: dict[str, list[Mapping[str, float]]] = {}
+        for configurations in self.of_names.values():
+            for name, positions in configurations.items():
+                found.setdefault(name, []).append(positions)
+        return {name: dict(meant[0]) for name, meant in found.items() if all(one == meant[0] for one in meant)}
 
 
 def add(session: Session, scene: Scene) -> SceneRow:
@@ -181,18 +183,10 @@ def known(session: Session, given: str) -> Known:
     """
     scene_id = find(session, given)
     if given != scene_id and (named := _version(session, given) or meaning(session, given)) is not None:
-        return Known(named.name, named.configurations, {})
-    versions = select(SceneNameRow).where(SceneNameRow.scene_id == scene_id)
-    last = {row.name: row.configurations for row in session.scalars(versions.order_by(SceneNameRow.version))}
-    found: dict[str, Mapping[str, float]] = {}
-    whose: dict[str, str] = {}
-    clashing: dict[str, tuple[str, str]] = {}
-    for name, configurations in last.items():
-        for one, positions in configurations.items():
-            if found.setdefault(one, positions) != positions:
-                clashing[one] = (whose[one], name)
-            whose.setdefault(one, name)
-    return Known(session.get_one(SceneRow, scene_id).name, found, clashing)
+        return Known(named.name, {named.name: named.configurations})
+    versions = select(SceneNameRow).where(SceneNameRow.scene_id == scene_id).order_by(SceneNameRow.version)
+    of_names = {row.name: row.configurations for row in session.scalars(versions)}  # the last version of each name
+    return Known(session.get_one(SceneRow, scene_id).name, of_names)
 
 
 @lru_cache(maxsize=16)

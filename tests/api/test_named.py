@@ -148,6 +148,19 @@ def test_each_name_of_a_scene_has_its_own_configurations(client: TestClient, oth
     assert ask(client, "/v1/planning/contains", scene=f"third@{other}", q=["rest"])["code"] == "scene_not_found"
 
 
+def test_the_last_part_of_a_name_counts_as_under_each_name(
+    client: TestClient, database: Database, named: Callable[..., None], scene: Scene
+) -> None:
+    """home is a configuration under one name, and the last part of arm/home under another one."""
+    (joint,) = (joint.name for joint in scene.moving)
+    with database.write() as session:
+        scene_id = scenes.add(session, replace(scene, name="long", configurations={"arm/home": {joint: 0.1}})).id
+    refused = ask(client, "/v1/planning/contains", scene=scene_id, q=["home"])
+    assert (refused["code"], refused["field"]) == ("configuration", "q[0]")
+    assert ask(client, "/v1/planning/contains", scene="long", q=["home"]) == ask(client, "/v1/planning/contains", q=[[0.1]])
+    assert ask(client, "/v1/planning/contains", scene=scene_id, q=["arm/home"])["status"] == 200
+
+
 def test_a_staged_scene_is_found_by_its_id_for_as_long_as_it_is_stored(client: TestClient, database: Database, other: str) -> None:
     (joint,) = (position["name"] for position in client.get("/v1/scenes/slider").json()["positions"])
     with database.write() as session:

@@ -124,8 +124,8 @@ def test_named_configurations_survive_the_way_down_and_up(empty_database_url: st
         scenes.add(session, slider("two"))
     database = there_and_back(database, empty_database_url, "0033")
     with database.read() as session:
-        assert scenes.known(session, "one").configurations == {"home": {joint: 0.1}}
-        assert scenes.known(session, "two").configurations == {"home": {joint: 0.1}}
+        assert scenes.known(session, "one").agreed == {"home": {joint: 0.1}}
+        assert scenes.known(session, "two").agreed == {"home": {joint: 0.1}}
         assert "configurations" not in scenes.get(session, scene_id).document
     database.close()
 
