@@ -24,6 +24,7 @@ from tests.api.test_access import bearer
 from tests.api.test_jobs import GROW
 from tests.api.test_metrics import samples
 from tests.services import Postgres, Queue, queue_server
+from tests.workers.service import eventually
 
 SOON = 5.0
 """Within a second on a machine that is idle; what hangs takes far longer than this to be given up."""
@@ -53,7 +54,7 @@ def soon(client: TestClient, path: str, **options: Any) -> Any:
 
 def test_a_queue_that_hangs_takes_neither_readiness_nor_metrics(own_queue: Queue, database: Database, scene: Scene) -> None:
     with TestClient(create_app(database), base_url=BASE_URL) as client:
-        assert samples(client.get("/metrics").text)['ciris_check{check="queue"}'] == 1
+        eventually(lambda: samples(client.get("/metrics").text)['ciris_check{check="queue"}'] == 1, "the first connection is made", 30)
         with own_queue.hangs():
             time.sleep(BELIEVED_SECONDS)
             for _ in range(3):

@@ -61,7 +61,7 @@ def test_a_scene_is_constrained(service: Any, scene: Scene) -> None:
 def test_a_scene_is_staged_and_promoted(service: Any, region: str) -> None:
     present = service.scene("slider")
     staged = service.stage_scene("slider", ROOT / "examples" / "planar_2dof" / "scene.yaml")
-    assert (staged.name, service.scene("slider@staged"), service.scene("slider")) == ("slider", staged, present)
+    assert (staged.name, service.scene("slider@staged"), service.scene("slider")) == ("slider@staged", staged, present)
     assert service.graph("slider@staged").edges == ()
     with pytest.raises(ciris.CirisError) as caught:
         service.promote_scene("slider")

@@ -128,8 +128,8 @@ def test_cancelling_ends_the_search(client: TestClient, planar: Scene) -> None:
 
 def test_the_deadline_ends_the_search_without_a_verdict(client: TestClient, planar: Scene) -> None:
     ended(submit(planar, long(1)), seconds=180)  # a solver is ready then
-    job_id = submit(planar, long(60 * LAPS), seconds=3.0)
-    job = ended(job_id, seconds=30)
+    job_id = submit(planar, long(60 * LAPS), seconds=10.0)
+    job = ended(job_id, seconds=60)
     assert (job.state, job.outcome, job.reason) == ("succeeded", "inconclusive", "the deadline was reached")
     refused = client.get(f"/v1/jobs/{job_id}/motion")
     assert (refused.status_code, refused.json()["code"]) == (404, "motion_not_found")

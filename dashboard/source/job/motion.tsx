@@ -7,15 +7,21 @@ import type { Job, JobMotion, SceneModel } from "../common/schema";
 import { Player, type Shown } from "../library/player";
 import { shownOf } from "../library/upload";
 
+/** The reason of a job whose deadline came first begins so. */
+const LATE = "the deadline was reached";
+
 interface Loaded {
   model: SceneModel;
   motion: Shown;
 }
 
 async function load(id: string, scene: string): Promise<Loaded | null> {
-  const [{ options }, verdict, model] = await Promise.all([get<Job>(`/v1/jobs/${id}`), get<JobMotion>(`/v1/jobs/${id}/motion`), get<SceneModel>(`/v1/scenes/${scene}/model`)]);
+  const { options, outcome, reason } = await get<Job>(`/v1/jobs/${id}`);
   const { q, space } = options as { q?: number[][]; space?: string };
-  return q && space !== "s" ? { model, motion: shownOf({ q, t: null }, verdict) } : null;
+  // A job that was cancelled, has failed or was too late has no verdict.
+  if (!q || space === "s" || !outcome || outcome === "error" || reason?.startsWith(LATE)) return null;
+  const [verdict, model] = await Promise.all([get<JobMotion>(`/v1/jobs/${id}/motion`), get<SceneModel>(`/v1/scenes/${scene}/model`)]);
+  return { model, motion: shownOf({ q, t: null }, verdict) };
 }
 
 export function Motion({ job, scene }: { job: string; scene: string }) {
@@ -26,7 +32,7 @@ export function Motion({ job, scene }: { job: string; scene: string }) {
     load(job, scene).then(setLoaded, (reason: unknown) => setProblem(said(reason)));
   }, [job, scene]);
   if (problem) return <p class="notice bad">The motion cannot be drawn: {problem}</p>;
-  if (!loaded) return null; // Or the motion is not straight in q, and only the claim says what is known of it.
+  if (!loaded) return null; // Or there is no verdict, or the motion is not straight in q, and only the claim says what is known of it.
   const { model, motion } = loaded;
   return (
     <section aria-labelledby="h-motion">
