@@ -154,46 +154,44 @@ class Distance:
 
 
 @dataclass(frozen=True)
-class Range:
-    """The sum of the angles of joints, each with its sign, stays between two angles, but for whole turns.
+class Summed:
+    """A sum of joint positions that stays between two numbers.
 
     Attributes:
         joints: the joints, and 1 or -1 for each.
-        lower, upper: radians, less than a whole turn apart.
+        lower, upper: radians or metres.
     """
 
     name: str
     joints: tuple[tuple[str, int], ...]
     lower: float
     upper: float
+
+    @property
+    def total(self) -> str:
+        """Returns the sum, in words."""
+        return " ".join(f"{'+' if sign > 0 else '-'} '{joint}'" for joint, sign in self.joints).removeprefix("+ ")
+
+
+@dataclass(frozen=True)
+class Range(Summed):
+    """The sum of the angles of joints, each with its sign, stays between two angles, less than a whole turn apart, but for whole turns."""
+
     kind: ClassVar = "range"
 
     def __str__(self) -> str:
         lower, upper = _down(math.degrees(self.lower)), _up(math.degrees(self.upper))
-        return f"{_sum(self.joints)} stays from {lower} to {upper} degrees, but for whole turns"
+        return f"{self.total} stays from {lower} to {upper} degrees, but for whole turns"
 
 
 @dataclass(frozen=True)
-class SlideRange:
-    """The sum of the positions of joints that slide, each with its sign, stays between two numbers.
+class SlideRange(Summed):
+    """The sum of the positions of joints that slide, each with its sign, stays between two numbers, in metres."""
 
-    Attributes:
-        joints: the joints, and 1 or -1 for each.
-        lower, upper: metres.
-    """
-
-    name: str
-    joints: tuple[tuple[str, int], ...]
-    lower: float
-    upper: float
     kind: ClassVar = "slides"
 
     def __str__(self) -> str:
-        return f"{_sum(self.joints)} stays from {_down(self.lower)} to {_up(self.upper)} m"
-
-
-def _sum(joints: Iterable[tuple[str, int]]) -> str:
-    return " ".join(f"{'+' if sign > 0 else '-'} '{joint}'" for joint, sign in joints).removeprefix("+ ")
+        return f"{self.total} stays from {_down(self.lower)} to {_up(self.upper)} m"
 
 
 Condition = Cone | Inside | InBall | Distance | Range | SlideRange

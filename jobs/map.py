@@ -92,7 +92,7 @@ class Map(Kind):
         for i, path in enumerate(given["paths"]):
             for j, q in enumerate(path):
                 check_positions(scene, q, f"options.paths[{i}][{j}]")
-        ways_of(scene, given["paths"])
+        ways_of(scene, given["paths"])  # refuses waypoints that are whole turns away
         return {**asdict(read(MapOptions, given, "options")), "former": None if body.former is None else _former(body.former, db)}
 
     def decide(self, turn: Turn) -> Lead | Finish:

@@ -124,7 +124,7 @@ def test_the_address_keeps_the_configuration(opened: Any) -> None:
 
 
 def test_the_configuration_of_the_address_is_for_its_scene_only(opened: Any, planar: Scene, database: Database) -> None:
-    """Another scene with as many joints begins at its own q*, and nobody is told of an address that nobody typed."""
+    """Another scene with the same number of joints begins at its own q*. The page does not complain about the address."""
     with database.write() as session:
         other = replace(planar, name="other", padding=0.001)
         scenes.add(session, other)

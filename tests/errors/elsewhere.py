@@ -77,7 +77,7 @@ TESTED = {
     "db/unusable.py:refusal": "tests/client/test_db.py",
     "db/version.py:refusal": "tests/db/test_version.py",
     "jobs/cover.py:save": "tests/workers/test_covers.py",
-    "jobs/failures.py:not_begun": "tests/workers/test_turns.py",
+    "jobs/failures.py:not_begun": "tests/workers/test_deadlines.py",
     "jobs/map.py:_former": "tests/workers/test_maps.py",
     "planner/poses/frame.py:_body": "tests/planner/poses/test_frame.py",
     "planner/poses/frame.py:_three": "tests/planner/poses/test_frame.py",

@@ -13,8 +13,11 @@ import yaml
 from certifier.model import Scene
 from certifier.pair.forecast import forecast
 from certifier.scene import load_scene
+from tests.scenes import slider
 from tests.services import Queue, queue_server
-from tests.workers.service import Service, running_service
+from tests.workers.options import box_around
+from tests.workers.service import Service, environment, running_service, submit
+from workers.turns import coordinate
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -61,3 +64,19 @@ def service(request: pytest.FixtureRequest, queue: Queue, tmp_path_factory: pyte
     queue.flush()
     with running_service(url, queue.url, logs) as running:
         yield running
+
+
+@pytest.fixture
+def here(database_url: str, own_queue: Queue) -> Iterator[None]:
+    """This process is the service."""
+    own_queue.flush()
+    with environment(CIRIS_DATABASE_URL=database_url, CIRIS_REDIS_URL=own_queue.url):
+        yield
+
+
+@pytest.fixture
+def job_id(here: None) -> str:
+    """A running job with three open pairs."""
+    made = submit(slider(posts=3), box_around([0.0], 0.1))
+    coordinate(made)
+    return made

@@ -18,15 +18,20 @@ export function readPath(name: string, text: string): Path | string {
   return ascending ? path : "Its t must be ascending numbers, one for each waypoint.";
 }
 
-function ofJson(text: string): Path | string {
-  let document: unknown;
+/** Returns the object in a text of JSON, or what is wrong with it. */
+export function objectOf(text: string, members: string): Record<string, unknown> | string {
   try {
-    document = JSON.parse(text);
+    const document: unknown = JSON.parse(text);
+    return typeof document === "object" && document !== null ? (document as Record<string, unknown>) : `It must be an object with ${members}.`;
   } catch {
     return "It is no JSON.";
   }
-  if (typeof document !== "object" || document === null) return "It must be an object with q, and perhaps t.";
-  const { q, t = null, ...others } = document as Record<string, unknown>;
+}
+
+function ofJson(text: string): Path | string {
+  const document = objectOf(text, "q, and perhaps t");
+  if (typeof document === "string") return document;
+  const { q, t = null, ...others } = document;
   if (["s", "bezier", "knots", "control_points"].some((other) => other in others)) return Q_ONLY;
   if (!Array.isArray(q) || !q.every(areNumbers)) return "Its q must be a list of waypoints, each of them a list of numbers.";
   if (t !== null && !areNumbers(t)) return "Its t must be a list of numbers.";

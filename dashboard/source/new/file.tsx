@@ -1,6 +1,6 @@
 // A file with a part of the request: chosen or dropped, and read in the browser.
 import { useState } from "preact/hooks";
-import { readPath } from "../common/waypoints";
+import { objectOf, readPath } from "../common/waypoints";
 import type { Fields, File as Read } from "./request";
 
 interface Props {
@@ -52,13 +52,9 @@ function motion(name: string, text: string): Fields | string {
 }
 
 function polytope(text: string): Fields | string {
-  let found: unknown;
-  try {
-    found = JSON.parse(text);
-  } catch {
-    return "It is no JSON.";
-  }
-  const { C, d, center } = (found ?? {}) as Fields;
+  const found = objectOf(text, "C and d");
+  if (typeof found === "string") return found;
+  const { C, d, center } = found;
   if (!Array.isArray(C) || C.length === 0 || !Array.isArray(d)) return "It must be an object with C and d.";
   return { C, d, ...(center !== undefined && { center }) };
 }

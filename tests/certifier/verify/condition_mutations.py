@@ -243,7 +243,7 @@ def listed(parts: Parts, rng: Rng) -> None:
     elif way == 4:
         conditions[i][chosen(rng, ["more", *sorted(conditions[j])])] = chosen(rng, HOSTILE)
     else:
-        many = chosen(rng, [value for one in conditions for value in one.values() if isinstance(value, list)])
+        many = chosen(rng, [value for one in conditions for value in one.values() if isinstance(value, list) and value])
         at = int(rng.integers(len(many)))
         many[:] = many[:at] + many[at + 1 :] if rng.random() < 0.6 else [*many, many[at]]
 
