@@ -219,6 +219,11 @@ def condition_of(scene: Scene, pair: Pair) -> Condition | None:
     return next((condition for condition in scene.conditions if condition.name == name), None)
 
 
+def contact_refutes(scene: Scene, pair: Pair) -> bool:
+    """Returns whether a contact of a pair shows that something fails. A polytope in a ball stands for the ball, and ends earlier."""
+    return not isinstance(condition_of(scene, pair), InBall)
+
+
 def distance_of(scene: Scene, pair: Pair) -> Distance | None:
     """Returns the condition with the largest distance that the two bodies of a pair have to keep; None where there is none."""
     kept = [one for one in scene.conditions if isinstance(one, Distance) and _between(_sides(scene, one), pair)]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from certifier.conditioned import contact_refutes
 from certifier.model import Pair, Scene
 from certifier.motion.approach import closest, proved_of
 from certifier.motion.bodies import bodies_of
@@ -107,7 +108,10 @@ class _Search:
         if pair < 0:
             return Found(proof, None)
         time = end.t1 if end.how == CONTACT else end.t0
-        return Found(proof, Stop(pairs[pair], end.piece, time, end.distance + kept, OUTCOMES.get(end.how, Outcome.TOO_CLOSE)))
+        outcome = OUTCOMES.get(end.how, Outcome.TOO_CLOSE)
+        if outcome is Outcome.REFUTED and not contact_refutes(self._scene, pairs[pair]):
+            outcome = Outcome.TOO_CLOSE
+        return Found(proof, Stop(pairs[pair], end.piece, time, end.distance + kept, outcome))
 
     def tightened(self, found: Found, kept: float) -> Found:
         """Returns a proof that shows nearly the least distance, with the same tube, and where the bodies come closest.

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from flint import fmpq
 
+from certifier.conditioned import contact_refutes
 from certifier.errors import ProofError
 from certifier.model import Array, Pair
 from certifier.proof.negative import WitnessProof
@@ -51,6 +52,8 @@ def check_witness(proof: WitnessProof) -> WitnessStatement:
         raise ProofError("proof_malformed", "the arrays of the witness do not fit the scene")
     if proof.pair not in scene.pairs:
         raise ProofError("proof_pair", f"{proof.pair.a} and {proof.pair.b} are not a pair of the scene")
+    if not contact_refutes(scene, proof.pair):
+        raise ProofError("proof_witness", "a contact of what stands for a ball does not show that anything is outside of the ball")
     if not (within_limits(scene, s) and Halfspaces(proof.C, proof.d).contains(s)):
         raise ProofError("proof_witness", "the configuration is not in the polytope, or not within the joint limits")
     point = [exact(x) for x in s]

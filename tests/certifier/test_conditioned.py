@@ -32,11 +32,13 @@ from certifier.model import WORLD, Array, JointKind, Pair, Scene
 from certifier.outcome import Outcome
 from certifier.pair.collisions import in_collision
 from certifier.proof.motion import Motion, Space
+from certifier.proof.negative import WitnessProof
 from certifier.scene.file import read_scene_file
 from certifier.scene.load import load_scene
 from certifier.seeding.free import check_free
 from certifier.verify.file import verify_file
 from certifier.verify.scene import check_scene
+from certifier.verify.witness import check_witness
 from tests.certifier.scenes import ball, box, cube, planar_arm, random_tree
 
 EXAMPLE = Path(__file__).parents[2] / "examples/ur3e_cup/scene.yaml"
@@ -285,7 +287,8 @@ def test_a_region_of_slides_keeps_sums_and_points_stay_in_zones(condition: Condi
     grown = local.certify(scene, cube(scene, np.zeros(2), 0.1), assemble=True, cells=200)
     assert grown.region is not None
     assert f"condition '{condition.name}': {condition}" in verify_file(grown.region.proof).lines
-    assert local.certify(scene, cube(scene, np.zeros(2), 0.16 if condition is NEAR else 0.12), cells=2000).outcome is Outcome.REFUTED
+    failing = local.certify(scene, cube(scene, np.zeros(2), 0.16 if condition is NEAR else 0.12), cells=2000)
+    assert failing.outcome is (Outcome.TOO_CLOSE if condition is NEAR else Outcome.REFUTED)
     outside = np.array([0.3, -0.1] if condition is AWAY else [0.2, 0.2])
     with pytest.raises(RegionError, match=f"the condition '{condition.name}' is not kept: .* mm beyond"):
         check_free(scene, outside, "seed.q")
@@ -330,6 +333,21 @@ def test_near_the_surface_of_a_ball_it_is_not_said_that_the_condition_fails() ->
     assert said == "the condition 'near' cannot be proved: a point of arm/link2 is 1 mm from the surface of the ball, which is too near"
     beyond = trouble(scene, pair, np.array([0.5, 0.501]))
     assert beyond == "the condition 'near' is not kept: a point of arm/link2 reaches 1 mm beyond the zone"
+
+
+@pytest.mark.parametrize("end", [0.149, 0.151], ids=["inside", "outside"])
+def test_a_contact_with_what_stands_for_a_ball_refutes_nothing(end: float) -> None:
+    """The point is 0.298 or 0.302 m from the middle, and 0.3 are allowed."""
+    scene = sliding(NEAR)
+    found = certify_motion(scene, Motion(Space.Q, np.array([[0.0, 0.0], [end, end]])))
+    assert found.stop is not None
+    assert found.outcome is Outcome.TOO_CLOSE
+    (pair, *_) = (pair for pair in scene.pairs if in_collision(replace(scene, pairs=(pair,)), scene.to_s(np.array([[end, end]])))[0])
+    s = scene.to_s(np.array([end, end]))
+    limits = scene.polytope([], [])
+    weights = tuple(np.ones(len(scene.geometry(name).vertices)) for name in (pair.a, pair.b))
+    with pytest.raises(ProofError, match="stands for a ball"):
+        check_witness(WitnessProof(scene, pair, limits.C, limits.d, s, weights))
 
 
 def test_a_seed_is_refused_with_the_angle_or_the_distance(conditioned: Scene) -> None:
