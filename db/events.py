@@ -55,7 +55,7 @@ def since(session: Session, job_id: str, seq: int = 0, limit: int = 500) -> Sequ
     return session.scalars(select(EventRow).where(EventRow.job_id == job_id, EventRow.seq > seq).order_by(EventRow.seq).limit(limit)).all()
 
 
-def work(session: Session, job_id: str) -> Sequence[Row[tuple[str, dict[str, Any], datetime]]]:
+def work(session: Session, job_id: str) -> Sequence[Row[str, dict[str, Any], datetime]]:
     """Returns kind, data and time of the job's events that tell of work that was done or lost, in order."""
     told = (EventRow.job_id == job_id, EventRow.kind.in_(("pairs", "step", NOTE, "lost")))
     return session.execute(select(EventRow.kind, EventRow.data, EventRow.created_at).where(*told).order_by(EventRow.seq)).all()

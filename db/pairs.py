@@ -434,13 +434,14 @@ def pace(session: Session, job_id: str, iteration: int) -> Pace | None:
     """Returns the pace of an iteration; None before two of its pieces are settled."""
     mine = (PairRow.job_id == job_id, PairRow.iteration == iteration)
     took, forecast = PairRow.seconds, PairRow.forecast_seconds
-    sums = (func.count(), *map(func.sum, (took, forecast, took * took, took * forecast, forecast * forecast)))
-    n, s, f, ss, sf, ff = session.execute(select(*sums).where(*mine, took.is_not(None))).one()
+    squares = (func.sum(took * took), func.sum(took * forecast), func.sum(forecast * forecast))
+    sums = select(func.count(), func.sum(took), func.sum(forecast), *squares)
+    n, s, f, ss, sf, ff = session.execute(sums.where(*mine, took.is_not(None))).one()
     left, waiting = session.execute(select(func.count(), func.sum(forecast)).where(*mine, PairRow.state.in_(UNFINISHED))).one()
-    if n < 2 or not f:
+    if n < 2 or not f or not s:
         return None
     ratio, ahead = s / f, waiting or 0.0
-    variance = max(ss - 2 * ratio * sf + ratio**2 * ff, 0.0) / (n - 1)
+    variance = max((ss or 0.0) - 2 * ratio * (sf or 0.0) + ratio**2 * (ff or 0.0), 0.0) / (n - 1)
     return Pace(n, left, s, ratio * ahead, math.sqrt(variance * (left + n * (ahead / f) ** 2)))
 
 

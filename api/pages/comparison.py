@@ -21,7 +21,7 @@ from jobs.registry import KINDS
 
 router = APIRouter()
 
-ABSENT = "–"
+ABSENT = "\N{EN DASH}"
 LISTED = 100
 """At most so many names of each kind are listed."""
 
@@ -74,7 +74,7 @@ def _described(db: Database, scene_id: str) -> dict[str, dict[Hashable, Any]]:
     return {
         "Bodies": dict.fromkeys(body for body in document["bodies"] if not of_condition(body)),
         "Geometries": {geometry["name"]: geometry for geometry in own},
-        "Pairs of bodies": {f"{pair.a} – {pair.b}": scene.padding_of(pair) for pair in of_bodies},
+        "Pairs of bodies": {f"{pair.a} \N{EN DASH} {pair.b}": scene.padding_of(pair) for pair in of_bodies},
         "Joint limits": {
             joint.name: (joint.unit, low, high) for joint, low, high in zip(scene.moving, scene.q_lower, scene.q_upper, strict=True)
         },

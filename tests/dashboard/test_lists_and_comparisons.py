@@ -63,7 +63,7 @@ def test_two_jobs_are_compared(page: Any, url: str, client: TestClient, database
     assert rows.locator("td").all_text_contents() == ["seed.q", "[0.0]", "[0.1]"]
     page.get_by_text("2 options are the same in both.").wait_for()
     row = page.get_by_role("row").filter(has_text="Pairs settled in the last iteration").locator("td")
-    assert row.all_text_contents() == ["2 of 2", "–"]
+    assert row.all_text_contents() == ["2 of 2", "\N{EN DASH}"]
     assert page.locator(f'.halves a[href="/regions/{region}"]').count() == 1
     assert barriers(page) == []
 
