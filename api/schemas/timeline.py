@@ -11,6 +11,7 @@ MOST_PROCESSES = 60
 BINS = 120
 """Where there are more pieces, they are told together in this many parts of the time."""
 
+_LEFT = {"iteration": 3, "seconds": 8.1, "error": 1.2, "settled": 30, "left": 14}
 _PROCESS = "solver-1.2f9a01c3:4711:8812734"
 
 
@@ -36,7 +37,9 @@ class Rate(BaseModel):
     begin: float = Field(description="Where this part begins, in seconds since the job's start.")
     end: float = Field(description="Where it ends.")
     pieces: float = Field(description="Pairs, and parts of pairs, settled per second.")
-    cells: float | None = Field(description="Cells of the map looked at per second; null where the job does not tell how many there were.")
+    cells: float | None = Field(
+        description="Cells of the map looked at per second; null where the job does not tell how many there were.", examples=[4200.0]
+    )
 
 
 class TimeLeft(BaseModel):
@@ -46,9 +49,13 @@ class TimeLeft(BaseModel):
     after it is not counted.
     """
 
+    model_config = ConfigDict(json_schema_extra={"examples": [_LEFT]})
+
     iteration: int = Field(description="The iteration.")
     seconds: float = Field(description="Seconds until all of its pieces are settled.")
-    error: float = Field(description="Standard error of this, as far as the pieces that are left are like those that are settled.")
+    error: float = Field(
+        description="Standard error of this, as far as the pieces that are left are like those that are settled.", examples=[1.2]
+    )
     settled: int = Field(description="Number of its pieces that are settled; a piece is a pair or a part of one.")
     left: int = Field(description="Number of its pieces that are not.")
 
@@ -79,8 +86,8 @@ class Timeline(BaseModel):
                         }
                     ],
                     "together": False,
-                    "rates": [{"begin": 0.0, "end": 12.4, "pieces": 0.4, "cells": None}],
-                    "left": {"iteration": 0, "seconds": 8.1, "error": 1.2, "settled": 30, "left": 14},
+                    "rates": [{"begin": 0.0, "end": 12.4, "pieces": 0.0, "cells": 4200.0}],
+                    "left": _LEFT,
                 }
             ]
         }
