@@ -51,13 +51,15 @@ class TimeLeft(BaseModel):
 
     model_config = ConfigDict(json_schema_extra={"examples": [_LEFT]})
 
-    iteration: int = Field(description="The iteration.")
-    seconds: float = Field(description="Seconds until all of its pieces are settled.")
+    iteration: int = Field(description="The iteration.", examples=[_LEFT["iteration"]])
+    seconds: float = Field(description="Seconds until all of its pieces are settled.", examples=[_LEFT["seconds"]])
     error: float = Field(
-        description="Standard error of this, as far as the pieces that are left are like those that are settled.", examples=[1.2]
+        description="Standard error of this, as far as the pieces that are left are like those that are settled.", examples=[_LEFT["error"]]
     )
-    settled: int = Field(description="Number of its pieces that are settled; a piece is a pair or a part of one.")
-    left: int = Field(description="Number of its pieces that are not.")
+    settled: int = Field(
+        description="Number of its pieces that are settled; a piece is a pair or a part of one.", examples=[_LEFT["settled"]]
+    )
+    left: int = Field(description="Number of its pieces that are not.", examples=[_LEFT["left"]])
 
 
 class Timeline(BaseModel):
