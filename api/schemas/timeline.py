@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from pydantic import BaseModel, ConfigDict, Field
 
 MOST_BARS = 1500
@@ -11,7 +13,7 @@ MOST_PROCESSES = 60
 BINS = 120
 """Where there are more pieces, they are told together in this many parts of the time."""
 
-_LEFT = {"iteration": 3, "seconds": 8.1, "error": 1.2, "settled": 30, "left": 14}
+_LEFT: dict[str, Any] = {"iteration": 3, "seconds": 8.1, "error": 1.2, "settled": 30, "left": 14}
 _PROCESS = "solver-1.2f9a01c3:4711:8812734"
 
 
@@ -109,5 +111,6 @@ class Timeline(BaseModel):
     )
     rates: list[Rate] = Field(description="How fast the work went, in parts of the time; empty where no pair and no cell was told of.")
     left: TimeLeft | None = Field(
-        description="How long the iteration that runs will last; null where none runs, and before 20 of its pieces are settled."
+        description="How long the iteration that runs will last; null where none runs, and before 20 of its pieces are settled.",
+        examples=[_LEFT],
     )
