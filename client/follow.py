@@ -66,7 +66,8 @@ class Teller:
             self._screen.line(f"iteration {data['index']} ({data['label']}): {result}{self._failure}")
             return
         self._total, self._done, self._failure = data["parts"], 0, ""
-        self._what = "pairs" if data["parts"] == data["pairs"] else f"parts of {data['pairs']} pairs"
+        of = f"{'pieces of work on' if data.get('together') else 'parts of'} {data['pairs']} pairs"
+        self._what = "pairs" if data["parts"] == data["pairs"] else of
         self._screen.status(f"iteration {data['index']} ({data['label']}): {self._total} {self._what}{self._kept}", 0.0)
 
     def _tell_pairs(self, data: dict[str, Any]) -> None:

@@ -73,6 +73,13 @@ def keep(session: Session, job_id: str, round: int, found: dict[int, bytes]) -> 
         session.execute(insert(MapPieceRow), rows)
 
 
+def spent(session: Session, job_id: str) -> dict[str, float]:
+    """Returns process -> the seconds that it took for pieces of the job's round; without those that the process that leads did itself."""
+    done = (*_pieces(job_id), StepRow.state == StepState.DONE, StepRow.seconds > 0.0)
+    rows = session.execute(select(StepRow.worker, func.sum(StepRow.seconds)).where(*done).group_by(StepRow.worker))
+    return {process or "": seconds or 0.0 for process, seconds in rows}
+
+
 def leads(session: Session, token: str) -> bool:
     """Says whether the step with this token, which leads a job, is still held."""
     return session.scalar(select(StepRow.id).where(leases.held(StepRow, token))) is not None

@@ -9,6 +9,7 @@ pairs, and says where the open ones begin. A job has one iteration at a time wit
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +18,7 @@ from sqlalchemy import ColumnElement, Select, exists, func, insert, select, tupl
 from sqlalchemy.orm import Session, defer
 
 from certifier import stored
+from certifier.conditions import condition_named
 from certifier.outcome import Outcome, combine
 from certifier.pair.result import PairResult
 from db import events, jobs, leases, proofs, subtrees
@@ -108,7 +110,8 @@ def add_iteration(session: Session, job: JobRow, action: dict[str, Any], pairs: 
         )
         job.open_pairs += len(pairs)
     job.pieces = len(pairs)
-    counts = {"pairs": len({pair.index for pair in pairs}), "parts": len(pairs), "reused": len(reuse)}
+    together = sum(map(len, action["together"].values()))
+    counts = {"pairs": len({pair.index for pair in pairs}) + together, "parts": len(pairs), "together": together, "reused": len(reuse)}
     events.emit(session, job, "iteration", {"index": index, "label": label, "state": "running", **counts})
 
 
@@ -194,7 +197,7 @@ def save(session: Session, claim: Claim, results: Mapping[tuple[int, int], PairR
         results: (pair index, part) -> result.
     """
     job = jobs.lock(session, claim.job_id)
-    columns = (PairRow.pair_index, PairRow.part, PairRow.id, PairRow.forecast_seconds)
+    columns = (PairRow.pair_index, PairRow.part, PairRow.id, PairRow.forecast_seconds, PairRow.a, PairRow.b, PairRow.worker)
     rows = session.execute(select(*columns).where(leases.held(PairRow, claim.token))).all()
     held = {(row.pair_index, row.part): row.id for row in rows}
     saved = {work: result for work, result in results.items() if work in held}
@@ -209,8 +212,9 @@ def save(session: Session, claim: Claim, results: Mapping[tuple[int, int], PairR
     charged = sum(row.forecast_seconds for row in rows if (row.pair_index, row.part) in saved)
     jobs.charge(session, job, sum(result.seconds for result in saved.values()) - charged)
     job.error = next((result.error for result in saved.values() if result.error is not None), job.error)
-    public = [_public(*work, result) for work, result in saved.items()]
-    events.emit(session, job, "pairs", {"iteration": claim.iteration, "pairs": public})
+    of_conditions = {row.pair_index for row in rows if condition_named(row.a, row.b) is not None}
+    public = [_public(*work, result, work[0] in of_conditions) for work, result in saved.items()]
+    events.emit(session, job, "pairs", {"iteration": claim.iteration, "worker": rows[0].worker, "pairs": public})
     rest = [pair for work, pair in held.items() if work not in saved]
     if FAILED.intersection(map(state_of, saved.values())) and (last := _last_failure(session, job.id, claim.iteration)) is not None:
         skip(session, job, PairRow.iteration == claim.iteration, PairRow.id > last)
@@ -408,6 +412,39 @@ def seconds(session: Session, job_id: str) -> float:
     return session.scalar(select(func.sum(PairRow.seconds)).where(PairRow.job_id == job_id)) or 0.0
 
 
+@dataclass(frozen=True)
+class Pace:
+    """Says how fast the pieces of an iteration, which are pairs or parts of pairs, are settled.
+
+    Attributes:
+        settled, left: number of pieces that are settled, and of those that are not.
+        spent: seconds that the settled ones took together.
+        expected, error: seconds that the others will take together, if they are to their forecasts as the settled ones are to theirs; and
+            the standard error of this.
+    """
+
+    settled: int
+    left: int
+    spent: float
+    expected: float
+    error: float
+
+
+def pace(session: Session, job_id: str, iteration: int) -> Pace | None:
+    """Returns the pace of an iteration; None before two of its pieces are settled."""
+    mine = (PairRow.job_id == job_id, PairRow.iteration == iteration)
+    took, forecast = PairRow.seconds, PairRow.forecast_seconds
+    squares = (func.sum(took * took), func.sum(took * forecast), func.sum(forecast * forecast))
+    sums = select(func.count(), func.sum(took), func.sum(forecast), *squares)
+    n, s, f, ss, sf, ff = session.execute(sums.where(*mine, took.is_not(None))).one()
+    left, waiting = session.execute(select(func.count(), func.sum(forecast)).where(*mine, PairRow.state.in_(UNFINISHED))).one()
+    if n < 2 or not f or not s:
+        return None
+    ratio, ahead = s / f, waiting or 0.0
+    variance = max((ss or 0.0) - 2 * ratio * (sf or 0.0) + ratio**2 * (ff or 0.0), 0.0) / (n - 1)
+    return Pace(n, left, s, ratio * ahead, math.sqrt(variance * (left + n * (ahead / f) ** 2)))
+
+
 def expected_seconds(session: Session, job_id: str, iteration: int) -> dict[int, float]:
     """Returns pair index -> seconds: what a part of the pair took in that iteration, or its forecast where it was not settled.
 
@@ -473,13 +510,14 @@ def _columns(result: PairResult, digests: Mapping[bytes, str]) -> dict[str, Any]
     }
 
 
-def _public(index: int, part: int, result: PairResult) -> dict[str, Any]:
+def _public(index: int, part: int, result: PairResult, of_condition: bool) -> dict[str, Any]:
+    distance = None if of_condition else result.margin  # What stands for a condition has no distance in metres.
     return {
         "index": index,
         "part": part,
         "state": state_of(result),
         "stage": result.stage,
-        "proved_distance": result.margin,
-        "margin": result.margin,
+        "proved_distance": distance,
+        "margin": distance,
         "seconds": result.seconds,
     }

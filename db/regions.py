@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from typing import Any
+from typing import Any, TypedDict, Unpack
 from uuid import uuid4
 
 import numpy as np
-from sqlalchemy import Select, func, select, update
+from sqlalchemy import Select, func, or_, select, update
 from sqlalchemy.orm import Session, defer
 
 from certifier.errors import CirisError
@@ -67,17 +67,40 @@ def get(session: Session, region_id: str) -> RegionRow:
     return row
 
 
+class Filters(TypedDict, total=False):
+    """Says which regions are wanted. A search finds those whose id, or whose job's id, begins with it."""
+
+    scene_id: str | None
+    job_id: str | None
+    guarantee: str | None
+    search: str | None
+
+
 def page(
-    session: Session, *, scene_id: str | None = None, job_id: str | None = None, after: str | None = None, limit: int = 100
+    session: Session, *, after: str | None = None, before: str | None = None, limit: int = 100, **filters: Unpack[Filters]
 ) -> Page[RegionRow]:
-    """Returns one page of the regions of one scene, of one job, or of all, without their manifests and arrays.
+    """Returns one page of the regions that match the filters, without their manifests and arrays.
+
+    Args:
+        after, before: the ``next`` or the ``previous`` of another page.
 
     Raises:
         CirisError: cursor.
     """
-    wanted = {RegionRow.scene_id: scene_id, RegionRow.job_id: job_id}
-    query = select(RegionRow).where(*(column == value for column, value in wanted.items() if value is not None)).options(*_UNREAD)
-    return pages.page(session, RegionRow, query, after, limit)
+    return pages.page(session, RegionRow, _matching(**filters).options(*_UNREAD), after, limit, before)
+
+
+def count(session: Session, **filters: Unpack[Filters]) -> int:
+    """Returns how many regions match the filters."""
+    return session.scalar(_matching(**filters).with_only_columns(func.count())) or 0
+
+
+def _matching(**filters: Unpack[Filters]) -> Select[RegionRow]:
+    columns = (RegionRow.scene_id, RegionRow.job_id, RegionRow.guarantee)
+    query = select(RegionRow).where(*(column == value for column in columns if (value := filters.get(column.key)) is not None))
+    if (search := filters.get("search")) is None:
+        return query
+    return query.where(or_(*(column.startswith(search, autoescape=True) for column in (RegionRow.id, RegionRow.job_id))))
 
 
 def of_job(session: Session, job_id: str) -> Sequence[RegionRow]:

@@ -73,7 +73,7 @@ def save(session: Session, claim: Claim, state: StepState, report: dict[str, Any
     job = jobs.get(session, claim.job_id)
     jobs.charge(session, job, seconds)
     if claim.kind != PIECE:
-        events.emit(session, job, "step", {"kind": claim.kind, "state": state, "seconds": seconds})
+        events.emit(session, job, "step", {"kind": claim.kind, "state": state, "seconds": seconds, "worker": leases.this_worker()})
     if claim.kind == ACCEPT and state == StepState.DONE:
         turn = select(StepRow.turn).where(StepRow.id == claim.step_id).scalar_subquery()
         earlier = (StepRow.job_id == job.id, StepRow.kind == ACCEPT, StepRow.turn < turn)

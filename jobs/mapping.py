@@ -164,6 +164,7 @@ class _Leading:
 
     def __init__(self, claim: steps.Claim, scene: Scene, late: float | None) -> None:
         self._claim, self._scene, self._late, self._told = claim, scene, late, 0.0
+        self._work: dict[str, float] = {}
 
     def over(self) -> str | None:
         """Returns why the map is to end now, if it is."""
@@ -187,7 +188,8 @@ class _Leading:
             self.saving(lambda session, job: maps.post(session, job, files))
             send_work(min(len(pieces) - 1, settings().solve_processes))
             self._share()
-            found = self.saving(lambda session, job: maps.settle(session, job, number, more))
+            spent, found = self.saving(lambda session, job: (maps.spent(session, job.id), maps.settle(session, job, number, more)))
+            self._work = {process: self._work.get(process, 0.0) + spent.get(process, 0.0) for process in self._work | spent}
         for i, data in found.items():
             for task, entry in zip(pieces[i], unpack_entries(self._scene, data), strict=True):
                 yield task, entry.found
@@ -242,12 +244,14 @@ class _Leading:
         """Keeps the account of the map, and says in the job's events how far it is, now and then."""
         now = time.monotonic()
         noted = now > self._told + NOTE_S
-        self._told = now if noted else self._told
+        note = {"text": account.said, "part": account.coverage, "cells": account.looked, "work": self._work}
+        if noted:
+            self._told, self._work = now, {}
 
         def save(session: Any, job: JobRow) -> None:
             jobs.keep_growth(session, job, stored.document(account))
             if noted:
-                events.emit(session, job, events.NOTE, {"text": account.said, "part": account.coverage})
+                events.emit(session, job, events.NOTE, note)
 
         self.saving(save)
 

@@ -28,7 +28,10 @@ router = APIRouter()
 
 @router.get("/jobs/{job_id}")
 def job_page(request: Request, job_id: str, db: Db) -> Response:
-    return page(request, "job.html", _job(db, job_id))
+    known = _job(db, job_id)
+    with db.read() as session:
+        others = [row for row in rows.page(session, scene_id=known["job"].scene).rows if row.id != known["job"].id]
+    return page(request, "job.html", known | {"others": others})
 
 
 @router.get("/jobs/{job_id}/live")

@@ -1,19 +1,68 @@
-"""These are the page of a region, and the one that has two of them side by side."""
+"""These are the list of regions, the page of a region, and the one that has two of them side by side."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Annotated, Any, Literal
+from urllib.parse import urlencode
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Query, Request, Response
+from pydantic import BaseModel
 
 from api.access import Db
 from api.pages.rendering import page
 from api.parameters import KNOWN_TO_PAGE
-from api.routers import regions
-from api.schemas.regions import RegionDetail
+from api.routers import regions, scenes
+from api.schemas.regions import RegionDetail, RegionSummary
+from certifier.outcome import Guarantee
+from db import regions as rows
+from db import scenes as known_scenes
+from jobs import patterns
+
+ON_A_PAGE = 50
 
 router = APIRouter()
+
+
+class Chosen(BaseModel):
+    """Says which regions somebody wants to see. A form sends an empty text for what nobody has chosen."""
+
+    scene: Annotated[str, Query(max_length=200)] = ""
+    guarantee: Guarantee | Literal[""] = ""
+    search: Annotated[str, Query(max_length=64, pattern=patterns.ANY)] = ""
+    after: Annotated[str, Query(max_length=200)] = ""
+    before: Annotated[str, Query(max_length=200)] = ""
+
+
+@router.get("/regions", dependencies=[KNOWN_TO_PAGE])
+def regions_page(request: Request, db: Db, chosen: Annotated[Chosen, Query()]) -> Response:
+    """Lists the regions of the project, or those that are like what was chosen.
+
+    Raises:
+        CirisError: scene_not_found, or cursor.
+    """
+    filters = {name: str(value) for name, value in chosen.model_dump(exclude={"after", "before"}).items() if value}
+    with db.read() as session:
+        wanted: rows.Filters = {
+            "scene_id": known_scenes.find(session, chosen.scene) if chosen.scene else None,
+            "guarantee": chosen.guarantee or None,
+            "search": chosen.search or None,
+        }
+        found = rows.page(session, after=chosen.after or None, before=chosen.before or None, limit=ON_A_PAGE, **wanted)
+        total = rows.count(session, **wanted)
+    known = scenes.list_scenes(db, limit=1000).scenes
+    context = {
+        "regions": [RegionSummary.of(row) for row in found.rows],
+        "total": total,
+        "chosen": chosen,
+        "filtered": bool(filters),
+        "guarantees": [*Guarantee],
+        "scenes": known,
+        "scene_names": {scene.id: scene.name for scene in known},
+        "older": urlencode(filters | {"after": found.next}) if found.next else None,
+        "newer": urlencode(filters | {"before": found.previous}) if found.previous else None,
+    }
+    return page(request, "regions.html", context)
 
 
 @router.get("/regions/{region_id}")

@@ -52,6 +52,7 @@ def scene_page(request: Request, scene_id: str, db: Db) -> Response:
         "pairs": scenes.get_scene_pairs(scene_id, db).pairs,
         "regions": found,
         "number": number,
+        "others": [other for other in scenes.list_scenes(db, limit=100).scenes if other.id != scene.id],
         "newest": newest,
         "distance": newest and min((pair["margin"] for pair in newest.manifest["pairs"] if pair["margin"] is not None), default=None),
     }

@@ -7,14 +7,14 @@ from fastapi.responses import HTMLResponse
 from fastapi.staticfiles import StaticFiles
 
 from api.access import READ
-from api.pages import form, home, job, project, region, scene, workers
+from api.pages import comparison, form, home, job, project, region, scene, workers
 from api.pages.rendering import ROOT
 
 
 def install(app: FastAPI) -> None:
     """Adds the pages and their static files to the application."""
     pages = APIRouter(include_in_schema=False, default_response_class=HTMLResponse, dependencies=[READ])
-    for part in (form, home, job, project, region, scene, workers):
+    for part in (comparison, form, home, job, project, region, scene, workers):
         pages.include_router(part.router)
     app.include_router(pages)
     app.mount("/static", StaticFiles(directory=ROOT / "static"), name="static")

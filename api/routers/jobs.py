@@ -14,7 +14,7 @@ from typing import Annotated
 from fastapi import APIRouter, BackgroundTasks, Header, Query, Response, status
 from pydantic import Field
 
-from api import held, submission
+from api import held, submission, timeline
 from api.access import READ, SUBMIT, Admin, Db, Submitter
 from api.announce import Announcements
 from api.delivery import unchanging
@@ -41,6 +41,7 @@ from api.schemas.jobs import (
 from api.schemas.progress import JobWorkers, Obstacle, Obstacles
 from api.schemas.scenes import PairInfo
 from api.schemas.service import Dependents
+from api.schemas.timeline import Timeline
 from api.writing import writing
 from certifier.conditions import condition_named
 from certifier.errors import CirisError
@@ -404,6 +405,21 @@ def get_job_workers(job_id: JobGiven, db: Db) -> JobWorkers:
         rows, begun = leases.of_job(session, PairRow, job.id), leases.of_job(session, StepRow, job.id)
         decided = jobs.is_coordinated(job, clock.now(session))
     return JobWorkers(workers=[*held.certifying(rows), *map(held.doing, begun), *([held.deciding(job)] if decided else [])])
+
+
+@router.get("/{job_id}/timeline")
+def get_job_timeline(
+    job_id: JobGiven,
+    db: Db,
+    since: Annotated[float, Query(ge=0, description="Tell of the time from here on, in seconds since the job's start.")] = 0.0,
+    until: Annotated[float | None, Query(ge=0, description="Tell of the time until here; by default until the job's end, or now.")] = None,
+) -> Timeline:
+    """Returns what each process has done for a job, when, how fast the work went, and how long the iteration that runs will last.
+
+    Of a long time with much work, it tells several pieces of work together. Ask for a part of the time to see each of them. A job that
+    has ended for long may have lost its events, and then nothing is told.
+    """
+    return timeline.of_job(db, job_id, since, until)
 
 
 @router.get("/{job_id}/obstacles")

@@ -209,7 +209,7 @@ class PairCell(BaseModel):
         "apart. Null where nothing is proved, and where the proof bounds none."
     )
     margin: float | None = Field(description="The same as `proved_distance`.", deprecated=True)
-    seconds: float | None = Field(description="Processor time that it took; null before it is settled.")
+    seconds: float | None = Field(description="How long it took, all parts together; null before it is settled.")
     detail: str | None = Field(description="More about the outcome, in words.")
     worker: str | None = Field(description="The process that holds it, or held it last: host, process number and start.")
     witness_q: list[float] | None = Field(

@@ -227,7 +227,7 @@ def record(client: TestClient, database: Database) -> dict[str, Any]:
     ask("POST", "/v1/jobs", {"kind": "recertify", "scene": name, "region": grown["region"]})
     for part in ("", "/lint", "/model", "/pairs", "/dependents"):
         ask("GET", f"/v1/scenes/{{scene_id}}{part}", scene_id=name)
-    for part in ("", "/webhook", "/pairs", "/pairs/states", "/events", "/growth", "/obstacles", "/workers", "/dependents"):
+    for part in ("", "/webhook", "/pairs", "/pairs/states", "/events", "/growth", "/timeline", "/obstacles", "/workers", "/dependents"):
         for job in (grown, other):
             ask("GET", f"/v1/jobs/{{job_id}}{part}", job_id=job["id"])
     ask("POST", "/v1/scenes/{scene_id}/constrain", {"name": "low-arm", "conditions": [LOW, AHEAD]}, scene_id=name)

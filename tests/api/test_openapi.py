@@ -46,6 +46,7 @@ OPERATIONS = {
     "download_pair_proof": "GET /v1/jobs/{job_id}/pairs/{pair}/proof",
     "get_job_cells": "GET /v1/jobs/{job_id}/pairs/{pair}/cells",
     "get_job_growth": "GET /v1/jobs/{job_id}/growth",
+    "get_job_timeline": "GET /v1/jobs/{job_id}/timeline",
     "get_job_cover": "GET /v1/jobs/{job_id}/cover",
     "get_job_map": "GET /v1/jobs/{job_id}/map",
     "download_map_proof": "GET /v1/jobs/{job_id}/map/proof",

@@ -152,13 +152,15 @@ def test_the_walk_would_find_what_is_shown(client: TestClient, theirs: dict[str,
 
 def test_lists_and_pages_are_empty_for_the_others(client: TestClient, theirs: dict[str, str]) -> None:
     ids = [theirs[name] for name in ("scene_id", "job_id", "region_id")]
-    for path in ("/v1/scenes", "/v1/jobs", "/v1/regions", "/v1/webhooks", "/", "/scenes", "/live"):
+    for path in ("/v1/scenes", "/v1/jobs", "/v1/regions", "/v1/webhooks", "/", "/scenes", "/regions", "/live"):
         mine, other = (client.get(path, headers=bearer(theirs[who])) for who in ("key", "stranger"))
         assert mine.status_code == other.status_code == 200
         assert any(one in mine.text for one in ids), path
         assert not any(one in other.text or one[:8] in other.text for one in ids), path
         assert "slider" not in other.text, path
-    for path in (f"/jobs/{theirs['job_id']}", f"/regions/{theirs['region_id']}", f"/scenes/{theirs['scene_id']}", "/scenes/slider"):
+    pages = [f"/jobs/{theirs['job_id']}", f"/regions/{theirs['region_id']}", f"/scenes/{theirs['scene_id']}", "/scenes/slider"]
+    pages += [f"/compare/{kind}s?a={theirs[f'{kind}_id']}&b={theirs[f'{kind}_id']}" for kind in ("job", "scene")]
+    for path in pages:
         assert client.get(path, headers=bearer(theirs["key"])).status_code == 200
         answer = client.get(path, headers=bearer(theirs["stranger"]) | {"Accept": "text/html"})
         assert answer.status_code == 404, path

@@ -39,8 +39,11 @@ def paths(client: TestClient, region: str) -> list[str]:
         "/workers/live",
         f"/jobs/{job['id']}",
         f"/jobs/{job['id']}/live",
+        "/regions",
         f"/regions/{region}",
         f"/scenes/{job['scene']}",
+        f"/compare/jobs?a={job['id']}&b={job['id']}",
+        f"/compare/scenes?a={job['scene']}&b={job['scene']}",
     ]
 
 

@@ -11,6 +11,7 @@ import { Obstacles } from "./obstacles";
 import { Pair } from "./pair";
 import { useRoute } from "./route";
 import { JobStore, type Drawable } from "./store";
+import { Timeline } from "./timeline";
 import { Workers } from "./workers";
 
 /** The motion of a job, once what draws it is there: three.js is large. */
@@ -66,8 +67,9 @@ export function JobIsland({ job, subject, scene, ended, begun, units }: { job: s
             robot={robot}
             whom={subject}
           />
-          {!store.ended && <Workers store={store} />}
-          <Log store={store} />
+          {!store.ended && <Workers store={store} subject={subject} />}
+          <Timeline store={store} subject={subject} />
+          <Log store={store} subject={subject} />
         </>
       )}
     </>

@@ -2,15 +2,9 @@
 import { useState } from "preact/hooks";
 import type { Event } from "../common/schema";
 import { duration, plural } from "./outcomes";
+import { stepOf } from "./steps";
 import type { JobStore } from "./store";
 
-const STEPS: Record<string, string> = {
-  propose: "Looking for a starting region around the seed",
-  step: "Moving the faces of the region",
-  accept: "Putting the region's proof together and verifying it",
-  scout: "Looking at what is covered",
-  motion: "Certifying the motion",
-};
 const STEP: Record<string, string> = { open: "waits for a worker", running: "begun" };
 const ITERATION: Record<string, string> = {
   certified: "is certified",
@@ -43,8 +37,8 @@ function counted(pairs: { state: string }[]): string {
   return [...counts].map(([state, count]) => `${count} ${state.replaceAll("_", " ")}`).join(", ");
 }
 
-/** Says in a sentence what has happened. */
-export function sentence({ kind, data }: Event): string {
+/** Says in a sentence what has happened to a job that makes the subject, such as the map. */
+function sentence({ kind, data }: Event, subject: string): string {
   const text = (name: string): string => String(data[name] ?? "").replaceAll("_", " ");
   /** The part of a sentence that is there only where the event has a value of this name. */
   const where = (name: string, words: string): string => (data[name] ? words : "");
@@ -58,7 +52,8 @@ export function sentence({ kind, data }: Event): string {
     case "iteration": {
       const one = `Iteration ${number} (${text("label")})`;
       if (state !== "running") return `${one} ${ITERATION[state] ?? state}.`;
-      return `${one} begins with ${plural(Number(data.pairs ?? 0), "pair")}${where("reused", `; ${data.reused} more keep their proofs`)}.`;
+      const together = where("together", `, of which ${data.together} share the proof of another one`);
+      return `${one} begins with ${plural(Number(data.pairs ?? 0), "pair")} to prove${together}${where("reused", `; ${data.reused} more keep their proofs`)}.`;
     }
     case "pairs": {
       const pairs = (data.pairs ?? []) as { state: string; seconds: number | null }[];
@@ -67,7 +62,7 @@ export function sentence({ kind, data }: Event): string {
     }
     case "step": {
       const after = where("seconds", ` after ${duration(Number(data.seconds))}`);
-      return `${STEPS[text("kind")] ?? text("kind")}: ${STEP[state] ?? state}${after}.`;
+      return `${stepOf(String(data.kind), subject)}: ${STEP[state] ?? state}${after}.`;
     }
     case "region": {
       const share = (data.share as { value: number | null } | null)?.value;
@@ -89,7 +84,7 @@ export function sentence({ kind, data }: Event): string {
   }
 }
 
-export function Log({ store }: { store: JobStore }) {
+export function Log({ store, subject }: { store: JobStore; subject: string }) {
   const [kind, setKind] = useState("");
   const known = store.events.filter((event) => !kind || event.kind === kind).reverse();
   const earlier = (store.events[0]?.seq ?? 1) > 1;
@@ -116,7 +111,7 @@ export function Log({ store }: { store: JobStore }) {
             <time dateTime={event.created_at} title={event.created_at}>
               {new Date(event.created_at).toLocaleTimeString()}
             </time>
-            <span>{sentence(event)}</span>
+            <span>{sentence(event, subject)}</span>
           </li>
         ))}
       </ol>

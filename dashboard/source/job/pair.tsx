@@ -1,7 +1,7 @@
 // A pair of a job: what has become of it in each iteration, where it touches, and its cells.
 import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { ServiceError, get, said } from "../common/api";
-import { positions } from "../common/kinematics";
+import { ofCondition, positions } from "../common/kinematics";
 import { Cells } from "../common/partition";
 import type { Partition } from "../common/schema";
 import { Contact } from "./contact";
@@ -151,10 +151,12 @@ function sentence(text: string): string {
   return text.charAt(0).toUpperCase() + text.slice(1);
 }
 
-function words({ certified, kind, iteration }: Partition, asked: number | undefined): string {
+function words({ pair, certified, kind, iteration }: Partition, asked: number | undefined): string {
+  const condition = [pair.a, pair.b].find(ofCondition)?.split("/")[1];
+  const held = condition === undefined ? "the two bodies are apart" : `the condition '${condition}' holds with room`;
   const parts = [
     certified
-      ? "A verified proof says that the two bodies are apart in every cell, on all of the polytope."
+      ? `A verified proof says that ${held} in every cell, on all of the polytope.`
       : "The pair is not certified. Cells with a plane count only once all cells have one, and the proof is verified.",
   ];
   if (kind === "program") parts.push("One plane, which moves with the joints, separates them everywhere: there is one cell.");

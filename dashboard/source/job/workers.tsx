@@ -6,15 +6,17 @@ import type { JobStore } from "./store";
 
 const WORK: Record<string, string> = {
   seed: "looks for the starting region",
+  map: "leads the work on the map",
+  piece: "proves cells of the map",
   step: "moves the faces of the region",
-  accept: "puts the region's proof together and verifies it",
   scout: "looks at what is covered",
   motion: "certifies a motion",
   decide: "decides what comes next",
 };
 const NAMED = 4;
 
-export function Workers({ store }: { store: JobStore }) {
+export function Workers({ store, subject }: { store: JobStore; subject: string }) {
+  const work = (kind: string): string => (kind === "accept" ? `puts the proof of ${subject} together and verifies it` : (WORK[kind] ?? kind));
   return (
     <section aria-labelledby="h-workers">
       <h2 id="h-workers">Working on it</h2>
@@ -25,7 +27,7 @@ export function Workers({ store }: { store: JobStore }) {
           {store.workers.map((worker) => (
             <li key={worker.process + worker.pairs.join()}>
               <code title={worker.process}>{worker.process.split(":").slice(0, 2).join(":")}</code>{" "}
-              <span>{worker.work === "pairs" ? <Certifies store={store} worker={worker} /> : (WORK[worker.work] ?? worker.work)}</span>
+              <span>{worker.work === "pairs" ? <Certifies store={store} worker={worker} /> : work(worker.work)}</span>
             </li>
           ))}
         </ul>

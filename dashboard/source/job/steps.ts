@@ -1,0 +1,17 @@
+// What the steps of a job are called.
+
+/** Says what a step does; of the job's subject, such as the region or the map. */
+export function stepOf(kind: string, subject: string): string {
+  return STEPS[kind]?.(subject) ?? kind;
+}
+
+const STEPS: Record<string, (subject: string) => string> = {
+  propose: () => "Looking for a starting region around the seed",
+  step: () => "Moving the faces of the region",
+  accept: (subject) => `Putting the proof of ${subject} together and verifying it`,
+  scout: () => "Looking at what is covered",
+  move: () => "Looking for motions between regions",
+  motion: () => "Certifying the motion",
+  map: () => "Leading the work on the map",
+  piece: () => "Proving cells of the map",
+};
