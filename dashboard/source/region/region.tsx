@@ -9,6 +9,7 @@ import type { Partition, RegionConfigurations, RegionDetail, RegionPair, RegionP
 import { ofCondition } from "../common/kinematics";
 import { Slice } from "../common/slice";
 import { Sliders } from "../common/sliders";
+import { PlaneText, usePlane } from "./plane";
 
 /** The keys of a manifest that the page needs. */
 interface Manifest {
@@ -61,6 +62,7 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
   const ghosts = useMemo(() => (swept ? configurations.samples.slice(0, GHOSTS) : []), [swept, configurations]);
   const names = shortNames(space.joints);
   const inside = contains(space, faces, q);
+  const plane = usePlane(id, model, space, pair, q, inside);
   const bodies = pairs.filter(({ a, b }) => !ofCondition(a) && !ofCondition(b)).length;
   const kept = bodies < pairs.length ? ", and the conditions hold" : "";
 
@@ -94,7 +96,7 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
       </div>
       <div class="views">
         <div class="stay">
-          <Robot model={model} q={q} ghosts={ghosts} label={`The robot of ${model.name} inside the region${swept ? `, with ${GHOSTS} samples of it` : ""}`} />
+          <Robot model={model} q={q} ghosts={ghosts} plane={plane.drawn} label={`The robot of ${model.name} inside the region${swept ? `, with ${GHOSTS} samples of it` : ""}`} />
           <div class="joints">
             <Sliders names={space.joints} units={model.units} lower={space.q_lower} upper={space.q_upper} allowed={inside ? rooms(space, faces, q) : undefined} q={q} onChange={go} />
             <div class="ends" role="group" aria-label="Ends of each joint within the region">
@@ -119,6 +121,7 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
               ))}
             </select>
           </label>
+          <PlaneText shown={plane} pair={pair} inside={inside} />
           {cellsProblem && <p class="notice bad">{cellsProblem}</p>}
         </div>
       </div>
