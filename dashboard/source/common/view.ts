@@ -172,7 +172,7 @@ export class View {
   setPlane(drawn: PlaneDrawn | null): void {
     if (drawn && !this.square) this.scene.add((this.square = new Square()).mesh);
     this.pair = drawn?.pair ?? [];
-    if (this.square) this.square.plane = drawn?.plane ?? null;
+    this.square?.show(drawn?.plane ?? null, this.pair.map((i) => this.drawn[i]!.mesh));
     this.colour(this.touching);
     this.setPose(this.q);
   }
@@ -266,7 +266,7 @@ export class View {
       axes.matrixWorldNeedsUpdate = true;
     }
     this.limits?.setPose(found);
-    this.square?.setPose(found, this.pair.map((i) => this.drawn[i]!.mesh));
+    this.square?.setPose(found);
     this.draw();
   }
 

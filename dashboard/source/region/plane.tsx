@@ -35,18 +35,20 @@ export function usePlane(region: string, model: SceneModel, space: Space, pair: 
     if (!cell) return null;
     const at = [1, ...cell.joints.map((joint) => s[joint]!)];
     const [x, y, z, b] = cell.Z.map((row) => row.reduce((sum, value, i) => sum + value * at[i]!, 0)) as [number, number, number, number];
-    const index = (name: string): number => model.geometries.findIndex((geometry) => geometry.name === name);
-    return { plane: { frame: cell.frame, a: [x, y, z], b }, pair: [index(cell.pair.a), index(cell.pair.b)] as [number, number] };
+    const bodies = [cell.pair.a, cell.pair.b].map((name) => model.geometries.findIndex((geometry) => geometry.name === name)) as [number, number];
+    // What stands for a condition has no body to be drawn.
+    if (bodies.some((i) => model.geometries[i]!.vertices.length === 0)) return null;
+    return { plane: { frame: cell.frame, a: [x, y, z], b }, pair: bodies };
   }, [model, cell, q.join()]);
   return { cell, drawn, problem };
 }
 
 /** Which plane is drawn, and what proves it. */
-export function PlaneText({ shown: { cell, problem }, pair, inside }: { shown: PlaneShown; pair: number | null; inside: boolean }) {
+export function PlaneText({ shown: { cell, drawn, problem }, pair, inside }: { shown: PlaneShown; pair: number | null; inside: boolean }) {
   if (pair === null) return null;
   return (
     <p class="small plane-said" role="status">
-      {problem ? `The plane cannot be drawn: ${problem}` : cell ? <><span class="proved">Proved:</span> the plane of cell {cell.cell} is between {cell.volumes[0]} and {cell.volumes[1]}. It is drawn in the frame of {cell.frame}.</> : inside ? "Looking for the plane …" : "The robot is outside the region: no plane is proved here."}
+      {problem ? `The plane cannot be drawn: ${problem}` : cell ? <><span class="proved">Proved:</span> the plane of cell {cell.cell} is between {cell.volumes[0]} and {cell.volumes[1]}. {drawn ? `It moves in the frame of ${cell.frame}.` : "It is not drawn, because one of the two stands for a condition."}</> : inside ? "Looking for the plane …" : "The robot is outside the region: no plane is proved here."}
     </p>
   );
 }

@@ -10,6 +10,7 @@ import { ofCondition } from "../common/kinematics";
 import { Slice } from "../common/slice";
 import { Sliders } from "../common/sliders";
 import { PlaneText, usePlane } from "./plane";
+import { SaveAsHtml } from "./save";
 
 /** The keys of a manifest that the page needs. */
 interface Manifest {
@@ -65,6 +66,7 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
   const plane = usePlane(id, model, space, pair, q, inside);
   const bodies = pairs.filter(({ a, b }) => !ofCondition(a) && !ofCondition(b)).length;
   const kept = bodies < pairs.length ? ", and the conditions hold" : "";
+  const proved = `The robot is inside the region: no collision of the ${bodies === 1 ? "covered pair" : `${bodies} covered pairs`}${kept}, as proved.`;
 
   useEffect(() => {
     setCells(null);
@@ -86,13 +88,14 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
     <section aria-labelledby="h-explore" class="explore">
       <h2 id="h-explore">Look inside</h2>
       <InClaim place="now">
-        <p role="status" class={inside ? "proved" : "inside not"}>{inside ? `The robot is inside the region: no collision of the ${bodies === 1 ? "covered pair" : `${bodies} covered pairs`}${kept}, as proved.` : "The robot is outside the region: nothing is proved here."}</p>
+        <p role="status" class={inside ? "proved" : "inside not"}>{inside ? proved : "The robot is outside the region: nothing is proved here."}</p>
       </InClaim>
       <div class="toolbar">
         <button type="button" aria-pressed={playing} onClick={() => setPlaying(!playing)}>{playing ? "Pause" : "Sweep through the region"}</button>
         <button type="button" onClick={() => go(configurations.center)}>Centre</button>
         {configurations.seed && <button type="button" onClick={() => go(configurations.seed!)}>Seed</button>}
         <label><input type="checkbox" checked={swept} onChange={(event) => setSwept(event.currentTarget.checked)} /> show {GHOSTS} samples</label>
+        <SaveAsHtml region={id} saved={{ model, space, faces, q, proved }} />
       </div>
       <div class="views">
         <div class="stay">
