@@ -37,7 +37,9 @@ NAMED = 3
 
 
 class OutlinesKept:
-    """Keeps the outlines of proof files, and the planes of some proofs. A file never changes, and may have a hundred megabytes, which take long to read."""
+    """Keeps the outlines of proof files, and the planes of some proofs. A file never changes, and may have a hundred
+    megabytes, which take long to read.
+    """
 
     def __init__(self) -> None:
         self._kept: LRUCache[str, list[ProofOutline]] = LRUCache(KEPT_NODES, getsizeof=_size)

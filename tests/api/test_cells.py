@@ -423,7 +423,8 @@ def test_the_plane_of_a_cell_is_between_the_bodies(client: TestClient, worker: N
             plane = ask(f"regions/{region}/pairs/{index}/plane?" + "&".join(f"q={value}" for value in q))
             s, lower, upper = scene.to_s(np.array(q)), np.array(plane["lower"]), np.array(plane["upper"])
             assert partition["nodes"][plane["cell"]] == PLANE
-            assert (lower <= s).all() and (s <= upper).all()
+            assert (lower <= s).all()
+            assert (s <= upper).all()
             assert any((low == lower).all() and (high == upper).all() for _, low, high in leaves(partition))
             # It is the plane of all of the cell, as far as the region reaches.
             C, d = (np.array(ask(f"regions/{region}")["manifest"][name]) for name in ("halfspace_normals", "halfspace_offsets"))

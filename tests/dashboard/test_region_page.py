@@ -181,7 +181,7 @@ def test_the_plane_of_the_cell_is_drawn_between_the_bodies_and_moves(opened: Any
     pictures.append(canvas.screenshot())
     assert len(set(pictures)) == 3
     opened.locator(".slice canvas").click(position={"x": 300, "y": 60})
-    opened.get_by_text("The robot is outside the region").wait_for()
+    opened.get_by_text("nothing is proved here").wait_for()
     says.get_by_text("no plane is proved here").wait_for()
 
 
