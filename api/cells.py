@@ -10,32 +10,40 @@ from operator import attrgetter
 from threading import Lock
 from typing import Any
 
+import numpy as np
 from cachetools import LRUCache, cachedmethod
 
-from api.schemas.cells import CellCounts, Partition, ProofKind, RegionPair
+from api.schemas.cells import CellCounts, Partition, ProofKind, RegionPair, SeparatingPlane
 from api.schemas.scenes import PairInfo
 from certifier.errors import CirisError
-from certifier.model import Scene
+from certifier.model import Array, Scene
 from certifier.proof.outline import Outline, ProofOutline, Silhouette, outlines
-from certifier.proof.partition import PartitionProof
+from certifier.proof.partition import PLANE, PartitionProof
+from certifier.proof.planes import Planes, planes
 from db import pairs, proofs, subtrees
 from db.models import RegionRow
 from db.session import Database
 from db.states import PairState
+from planner.membership import to_s
 
 MOST_NODES = 200_000
 """Largest number of nodes in an answer."""
 KEPT_NODES = 5_000_000
 """Each process keeps the outlines of the regions that were asked about last, up to this many nodes together."""
+KEPT_NUMBERS = 5_000_000
+"""Each process keeps the planes of the pairs that were asked about last, up to this many numbers together."""
 NAMED = 3
 """A volume that stands for more geometries is named by this many of them."""
 
 
 class OutlinesKept:
-    """Keeps the outlines of proof files. A file never changes, and may have a hundred megabytes, which take long to read."""
+    """Keeps the outlines of proof files, and the planes of some proofs. A file never changes, and may have a hundred
+    megabytes, which take long to read.
+    """
 
     def __init__(self) -> None:
         self._kept: LRUCache[str, list[ProofOutline]] = LRUCache(KEPT_NODES, getsizeof=_size)
+        self._planes: LRUCache[tuple[str, int], Planes] = LRUCache(KEPT_NUMBERS, getsizeof=lambda known: min(KEPT_NUMBERS, known.Z.size))
         self._lock = Lock()
 
     @cachedmethod(attrgetter("_kept"), key=lambda self, database, digest, scene: digest, lock=attrgetter("_lock"))
@@ -44,6 +52,13 @@ class OutlinesKept:
         with database.read() as session:
             data = proofs.get(session, digest)
         return outlines(data, scene)
+
+    @cachedmethod(attrgetter("_planes"), key=lambda self, database, digest, number, outline: (digest, number), lock=attrgetter("_lock"))
+    def planes_of(self, database: Database, digest: str, number: int, outline: ProofOutline) -> Planes:
+        """Returns the planes of the proof with this number, and this outline, in the file with this digest."""
+        with database.read() as session:
+            data = proofs.get(session, digest)
+        return planes(data, number, outline)
 
 
 def _size(known: Sequence[ProofOutline]) -> int:
@@ -89,6 +104,37 @@ def of_region_pair(scene: Scene, region: RegionRow, known: Sequence[ProofOutline
     """Describes the cells of a pair of a region."""
     proof = known[_number_of(region.manifest)[index]]
     return partition(scene, index, proof.cells, PairState.CERTIFIED, _kind(proof))
+
+
+def plane_at(database: Database, kept: OutlinesKept, scene: Scene, region: RegionRow, index: int, q: Array) -> SeparatingPlane:
+    """Returns the plane of a pair's proof in the cell that holds the configuration q, (n,).
+
+    Raises:
+        CirisError: cells_not_found, where the region does not contain q.
+    """
+    number = _number_of(region.manifest)[index]
+    proof = kept.of(database, region.proof_digest, scene)[number]
+    tree, s = proof.cells.tree, to_s(scene, q[None])[0]
+    inside = bool(np.all(region.arrays["C"] @ s <= region.arrays["d"]))  # s is NaN outside of the limits
+    path = tree.path(s) if inside else []
+    if not path or tree.nodes[path[-1]] != PLANE:
+        message = f"the region does not contain the configuration, so no cell of pair {index} is proved about it"
+        raise CirisError("cells_not_found", message, field="q", hint="/v1/regions/{id}/configurations has some of its configurations")
+    found = kept.planes_of(database, region.proof_digest, number, proof)
+    place = int((tree.nodes[: path[-1]] == PLANE).sum())
+    pair, volumes, lower_upper = numbered(scene, index), proof.cells.chosen[int(tree.choices[place])], proof.cells.cell(path)
+    swapped = pair.a not in volumes[0].geometries
+    first, second = volumes[::-1] if swapped else volumes
+    return SeparatingPlane(
+        pair=pair,
+        cell=path[-1],
+        lower=lower_upper[0].tolist(),
+        upper=lower_upper[1].tolist(),
+        volumes=(_in_words(first), _in_words(second)),
+        frame=found.frame,
+        joints=list(found.joints),
+        Z=(-found.Z[place] if swapped else found.Z[place]).tolist(),
+    )
 
 
 def _number_of(manifest: Mapping[str, Any]) -> dict[int, int]:

@@ -61,6 +61,7 @@ ALSO: dict[str, tuple[str, ...]] = {
     "get_job_cells": ("cells_not_found",),
     "get_region_cells": ("cells_not_found", "proof_not_found"),
     "get_region_pairs": ("proof_not_found",),
+    "get_region_plane": ("cells_not_found", "proof_not_found", "wrong_length", "number_too_large"),
     "get_region_configurations": CHILDREN,
     "download_region_proof": ("proof_not_found",),
     "verify_region": ("proof_not_found", *CHILDREN),

@@ -43,21 +43,21 @@ function licences(inputs) {
 
 rmSync(BUILT, { recursive: true, force: true });
 mkdirSync(BUILT, { recursive: true });
-const result = await build({
+const OPTIONS = {
   absWorkingDir: HERE,
-  entryPoints: { main: "source/main.ts" },
   outdir: BUILT,
   bundle: true,
-  splitting: true,
   format: "esm",
   target: "es2022",
   minify: true,
   legalComments: "none",
-  chunkNames: "[name]-[hash]",
   jsx: "automatic",
   jsxImportSource: "preact",
   metafile: true,
   logLevel: "info",
-});
+};
+const result = await build({ ...OPTIONS, entryPoints: { main: "source/main.ts" }, splitting: true, chunkNames: "[name]-[hash]" });
+// A page that is saved as one file has all of its program in it.
+await build({ ...OPTIONS, entryPoints: { standalone: "source/standalone.tsx" } });
 writeFileSync(join(BUILT, "licences.txt"), licences(Object.keys(result.metafile.inputs)));
 writeFileSync(join(BUILT, "sources.sha256"), `${digestOfSources()}\n`);

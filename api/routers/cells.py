@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Request
+from fastapi import APIRouter, Depends, Query, Request
+from pydantic import FiniteFloat
 
-from api import cells
+from api import cells, checks
 from api.access import READ, Db
 from api.cells import OutlinesKept
 from api.delivery import unchanging
 from api.reading import ReadingRoute
-from api.schemas.cells import Partition, RegionPairs
+from api.schemas.cells import Partition, RegionPairs, SeparatingPlane
 from api.schemas.common import JobGiven, OfIteration, PairGiven, RegionGiven
 from db import jobs, regions, scenes
 
@@ -24,6 +25,10 @@ async def _outlines(request: Request) -> OutlinesKept:
 
 
 Outlines = Annotated[OutlinesKept, Depends(_outlines)]
+AtQ = Annotated[
+    list[FiniteFloat],
+    Query(min_length=1, max_length=64, description="The configuration: `q` once for each joint, in order, in radians or metres."),
+]
 
 
 @router.get("/regions/{region_id}/pairs", tags=["regions"])
@@ -45,6 +50,16 @@ def get_region_cells(region_id: RegionGiven, pair: PairGiven, db: Db, outlines: 
     scene = scenes.load(db, region.scene_id)
     cells.numbered(scene, pair)
     return cells.of_region_pair(scene, region, outlines.of(db, region.proof_digest, scene), pair)
+
+
+@router.get("/regions/{region_id}/pairs/{pair}/plane", tags=["regions"])
+def get_region_plane(region_id: RegionGiven, pair: PairGiven, q: AtQ, db: Db, outlines: Outlines) -> SeparatingPlane:
+    """Returns the plane that separates a pair of a region in the cell of its proof that holds a configuration of the region."""
+    with db.read() as session:
+        region = regions.get(session, region_id)
+    scene = scenes.load(db, region.scene_id)
+    cells.numbered(scene, pair)
+    return cells.plane_at(db, outlines, scene, region, pair, checks.point(scene, q, "q"))
 
 
 @router.get("/jobs/{job_id}/pairs/{pair}/cells", tags=["jobs"])

@@ -124,3 +124,38 @@ class Partition(BaseModel):
         description="For each node that is -4, in order: the leaves below it. Empty where the answer shows the whole tree. An answer has "
         "at most 200000 nodes; in a larger tree, cells are folded from a depth on, the same one for all."
     )
+
+
+class SeparatingPlane(BaseModel):
+    """Holds the plane of a pair's proof in the cell that holds a configuration: [a; b](s) = Z [1; s_J], in a body's frame, in metres.
+
+    In this cell, as far as the region reaches, a'p + b > 0 for the points p of the pair's first body, and a'p + b < 0 for those of the
+    second one. The verifier has accepted this. The numbers are those of the proof file; what is computed with them in floating point is
+    rounded.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "pair": {"index": 0, "a": "arm/link2/box", "b": "world/post"},
+                    "cell": 1,
+                    "lower": [-0.6, -0.4],
+                    "upper": [0.05, 0.4],
+                    "volumes": ["arm/link2/box", "world/post"],
+                    "frame": "arm/link1",
+                    "joints": [0, 1],
+                    "Z": [[0.8, 0.1, 0.2], [-0.3, 0.4, 0.1], [0.0, 0.0, 0.0], [-0.2, 0.1, 0.1]],
+                }
+            ]
+        }
+    )
+
+    pair: PairInfo = Field(description="The pair.")
+    cell: int = Field(description="Number of the cell: of its node in the tree of the pair's proof, in preorder.")
+    lower: list[float] = Field(description="(n,) lower corner of the cell, in s.")
+    upper: list[float] = Field(description="(n,) upper corner of the cell, in s.")
+    volumes: tuple[str, str] = Field(description="In words, what the plane separates: `a` and `b`, or simpler volumes that contain them.")
+    frame: str = Field(description="Body whose frame a, b and p are expressed in.")
+    joints: list[int] = Field(description="J: position indices of the joints that the plane moves with, ascending.")
+    Z: list[list[float]] = Field(description="(4, 1 + k), for the k joints: three rows for a, and one for b.")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import islice, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,6 +58,15 @@ class Tree(NamedTuple):
         before = np.concatenate([[0], waiting[:-1]])
         found = np.searchsorted(order, (before - 1 - least) * len(waiting) + places)
         return order[found] % len(waiting) + 1
+
+    def path(self, s: Array) -> list[int]:
+        """Returns the nodes of the one tree whose cells hold the point s, (n,), from the root to a leaf; on a cut, the lower part's."""
+        ends, inner = self.ends(), _sums(self.nodes >= 0)
+        found = [0]
+        while (joint := self.nodes[found[-1]]) >= 0:
+            node = found[-1]
+            found.append(node + 1 if s[joint] <= self.cuts[inner[node]] else int(ends[node + 1]))
+        return found
 
     def split(self) -> list[Tree]:
         """Returns the trees one by one."""
@@ -141,6 +150,14 @@ class Outline:
         """Returns what a leaf's plane separates, by the leaf's choice."""
         first, second = self.sides
         return [(a, b) for b in second for a in first]
+
+    def cell(self, path: Sequence[int]) -> tuple[Array, Array]:
+        """Returns the bounds (n,) of the cell of the last node of a path of the tree."""
+        lower, upper, inner = self.lower.copy(), self.upper.copy(), _sums(self.tree.nodes >= 0)
+        for above, node in pairwise(path):
+            bound = upper if node == above + 1 else lower
+            bound[self.tree.nodes[above]] = self.tree.cuts[inner[above]]
+        return lower, upper
 
     @property
     def counts(self) -> Counts:

@@ -234,6 +234,7 @@ def record(client: TestClient, database: Database) -> dict[str, Any]:
     ask("GET", "/v1/scenes/{scene_id}/model", scene_id="low-arm")
     for part in ("", "/configurations", "/pairs", "/pairs/0/cells"):
         ask("GET", f"/v1/regions/{{region_id}}{part.replace('/0/', '/{pair}/')}", region_id=grown["region"], pair=0)
+    ask("GET", "/v1/regions/{region_id}/pairs/{pair}/plane", params={"q": home}, region_id=grown["region"], pair=0)
     ask("POST", "/v1/regions/{region_id}/verify", region_id=grown["region"])
     for route in ("/v1/scenes", "/v1/jobs", "/v1/regions", "/v1/webhooks"):
         ask("GET", route, params={"limit": 2})

@@ -12,7 +12,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from api import cells
-from certifier.model import Pair, Scene
+from certifier.kinematics import Kinematics
+from certifier.model import Array, Pair, Scene
 from certifier.outcome import Outcome, Stage
 from certifier.pair.result import PairResult
 from certifier.partition.certification import CellCertification
@@ -396,3 +397,47 @@ def test_the_outlines_of_regions_are_kept_within_bounds(database: Database, regi
         digest = proofs.put(session, [other])[other]
     kept.of(database, digest, scene)
     assert kept.of(database, row.proof_digest, scene) is not first, "it made room"
+
+
+def sides_of(scene: Scene, plane: dict[str, Any], s: Array) -> tuple[float, float]:
+    """How far the two bodies of a pair are from the plane at s, (n,), times |a|: the least of the first, the most of the second."""
+    *a, b = np.array(plane["Z"]) @ [1.0, *s[plane["joints"]]]
+    a = np.array(a)
+    found = []
+    for name, least in ((plane["pair"]["a"], 1), (plane["pair"]["b"], -1)):
+        geometry = scene.geometry(name)
+        p = Kinematics.of(scene).points(plane["frame"], geometry.body, geometry.vertices, s[None])[0]
+        found.append(least * ((least * (p @ a + b)).min() - geometry.radius * np.linalg.norm(a)))
+    return found[0], found[1]
+
+
+def test_the_plane_of_a_cell_is_between_the_bodies(client: TestClient, worker: None, database: Database, ask: Ask) -> None:
+    """At random configurations of the region, all of one body is on one side of the plane of their cell, and all of the other beyond."""
+    scene = stored(database, passing())
+    region = grown(client, scene)["region"]
+    rng, met = np.random.default_rng(0), set()
+    samples = ask(f"regions/{region}/configurations?samples=40")["samples"]
+    for index in range(len(scene.pairs)):
+        partition = ask(f"regions/{region}/pairs/{index}/cells")
+        for q in samples:
+            plane = ask(f"regions/{region}/pairs/{index}/plane?" + "&".join(f"q={value}" for value in q))
+            s, lower, upper = scene.to_s(np.array(q)), np.array(plane["lower"]), np.array(plane["upper"])
+            assert partition["nodes"][plane["cell"]] == PLANE
+            assert (lower <= s).all()
+            assert (s <= upper).all()
+            assert any((low == lower).all() and (high == upper).all() for _, low, high in leaves(partition))
+            # It is the plane of all of the cell, as far as the region reaches.
+            C, d = (np.array(ask(f"regions/{region}")["manifest"][name]) for name in ("halfspace_normals", "halfspace_offsets"))
+            others = rng.uniform(lower, upper, (20, scene.n))
+            for point in (s, *others[(others @ C.T <= d).all(axis=1)]):
+                first, second = sides_of(scene, plane, point)
+                assert first > 0 > second
+            met.add((index, plane["cell"]))
+    assert len(met) > len(scene.pairs), "several cells of a pair are met"
+
+
+def test_outside_of_the_region_no_plane_is_proved(client: TestClient, region: str, ask: Ask) -> None:
+    for q, code in (("q=2.0", "cells_not_found"), ("q=999", "cells_not_found"), ("q=0&q=0", "wrong_length")):
+        refused = client.get(f"/v1/regions/{region}/pairs/0/plane?{q}")
+        assert refused.status_code in {404, 422}
+        assert (refused.json()["code"], refused.json()["field"]) == (code, "q")

@@ -65,6 +65,7 @@ OPERATIONS = {
     "get_region_configurations": "GET /v1/regions/{region_id}/configurations",
     "get_region_pairs": "GET /v1/regions/{region_id}/pairs",
     "get_region_cells": "GET /v1/regions/{region_id}/pairs/{pair}/cells",
+    "get_region_plane": "GET /v1/regions/{region_id}/pairs/{pair}/plane",
     "download_region_proof": "GET /v1/regions/{region_id}/proof",
     "verify_region": "POST /v1/regions/{region_id}/verify",
     "export_region": "GET /v1/regions/{region_id}/export",

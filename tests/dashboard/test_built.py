@@ -36,7 +36,7 @@ def test_no_built_file_is_left_over_or_missing() -> None:
         name = waiting.pop()
         if name not in wanted:
             wanted.add(name)
-            waiting += re.findall(r'"\./([\w.-]+\.js)"', (BUILT / name).read_text())
+            waiting += re.findall(r'["`]\./([\w.-]+\.js)["`]', (BUILT / name).read_text())
     assert built == wanted, REBUILD
 
 

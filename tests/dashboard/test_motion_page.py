@@ -46,5 +46,28 @@ def test_where_nothing_is_proved_the_motion_says_so(page: Any, url: str, planar:
     assert "m apart" not in page.locator("main").text_content()
 
 
+@pytest.mark.usefixtures("worker")
+@pytest.mark.parametrize("given", ["s", "q"])
+def test_a_motion_that_is_straight_in_s_is_played_so(page: Any, url: str, planar: Scene, client: TestClient, given: str) -> None:
+    s = planar.to_s(np.array(FREE))
+    asked = {"s": s.tolist()} if given == "s" else {"q": FREE, "space": "s"}
+    job = client.post("/v1/jobs", json={"kind": "certify-path", "scene": "planar", **asked}).json()["id"]
+    page.goto(f"{url}/jobs/{job}")
+    page.locator(".claim").get_by_text("stay apart").wait_for(timeout=60_000)
+    page.get_by_text("The motion is straight in s.").wait_for()
+    assert page.locator(".joint-key").all_text_contents() == [
+        f" joint{i + 1} {np.rad2deg(a):.1f}\N{DEGREE SIGN} \N{RIGHTWARDS ARROW} {np.rad2deg(b):.1f}\N{DEGREE SIGN}"
+        for i, (a, b) in enumerate(zip(*FREE, strict=True))
+    ]
+    # The curves are those of q along the line in s.
+    drawn = page.locator(".player .chart > path").all()
+    for joint, path in enumerate(drawn):
+        heights = np.array([float(place.split(",")[1]) for place in path.get_attribute("d")[1:].split("L")])
+        q = planar.to_q(np.linspace(*s, len(heights)))[:, joint]
+        assert (heights - heights[0]) / (heights[-1] - heights[0]) == pytest.approx((q - q[0]) / (q[-1] - q[0]), abs=2e-3)
+    page.get_by_label("Time, seconds").press("End")
+    page.locator(".moment", has_text="on the path, which is certified").wait_for()
+
+
 def test_a_large_distance_has_no_exponent() -> None:
     assert [at_least_mm(metres) for metres in (1.1547, 0.5, 12.3456)] == ["1150 mm", "500 mm", "12300 mm"]

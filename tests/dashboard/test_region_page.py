@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -159,6 +160,55 @@ def test_the_cells_of_a_pair_are_drawn_over_the_slice(opened: Any, planar: Scene
     opened.wait_for_timeout(200)
     assert opened.locator(".slice canvas").screenshot() != before
     assert opened.locator(".key-map.cells").count() == 1
+
+
+def test_the_plane_of_the_cell_is_drawn_between_the_bodies_and_moves(opened: Any, barriers: Any) -> None:
+    canvas, says = opened.locator(".robot canvas"), opened.locator(".plane-said")
+    opened.get_by_label("show 40 samples").uncheck()
+    opened.wait_for_timeout(200)
+    pictures = [canvas.screenshot()]
+    with opened.expect_response(lambda response: "/plane?" in response.url) as answer:
+        opened.get_by_label("Cells of the pair").select_option(index=1)
+    plane = answer.value.json()
+    says.get_by_text(f"the plane of cell {plane['cell']} is between {plane['volumes'][0]} and {plane['volumes'][1]}").wait_for()
+    assert says.locator(".proved").text_content() == "Proved:"
+    opened.wait_for_timeout(200)
+    pictures.append(canvas.screenshot())
+    assert barriers(opened) == []
+    opened.get_by_role("button", name="arm/joint2 max").click()
+    says.get_by_text("the plane of cell").wait_for()
+    opened.wait_for_timeout(200)
+    pictures.append(canvas.screenshot())
+    assert len(set(pictures)) == 3
+    opened.locator(".slice canvas").click(position={"x": 300, "y": 60})
+    opened.get_by_text("nothing is proved here").wait_for()
+    says.get_by_text("no plane is proved here").wait_for()
+
+
+def test_the_page_is_saved_as_one_file_that_needs_no_service(
+    opened: Any, browser: Any, planar_region: str, outside: tuple[str, list[str]], barriers: Any, tmp_path: Path
+) -> None:
+    claim = opened.locator(".claim p").first.text_content()
+    with opened.expect_download() as saved:
+        opened.get_by_role("button", name="Save as HTML").click()
+    assert saved.value.suggested_filename == f"{planar_region}.html"
+    saved.value.save_as(tmp_path / "region.html")
+    context = browser.new_context(offline=True)
+    page, asked, complaints = context.new_page(), [], []
+    context.on("request", lambda request: asked.append(request.url))
+    page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto((tmp_path / "region.html").as_uri())
+    page.get_by_text("The robot is inside the region: no collision of the 2 covered pairs, as proved.").wait_for()
+    assert page.locator(".claim p").first.text_content() == claim
+    assert f"ciris verify {planar_region}.proof" in page.locator("main").text_content()
+    before = page.locator(".robot canvas").screenshot()
+    page.get_by_role("slider", name="arm/joint1, degrees").press("End")
+    until(lambda: page.locator(".robot canvas").screenshot() != before)
+    page.get_by_text("The robot is inside the region").wait_for()
+    assert barriers(page) == []
+    assert [url for url in asked if not url.startswith("file:")] == complaints == outside[1] == []
+    context.close()
 
 
 @pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.slow)])

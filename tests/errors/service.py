@@ -241,6 +241,7 @@ SERVICE: Table = {
     ("method_not_allowed", "method"): [lambda t: t.ask("PUT", "/v1/jobs")],
     ("pair_not_found", "pair"): [lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/pairs/9/cells")],
     ("cells_not_found", "pair"): [lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/pairs/0/cells")],
+    ("cells_not_found", "q"): [lambda t: t.ask("GET", f"/v1/regions/{t.need('region')}/pairs/0/plane?q=9")],
     ("proof_not_found", "pair"): [lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/pairs/0/proof?iteration=0")],
     ("bad_name", "name"): [lambda t: t.ask("GET", "/v1/regions/none/export", params={"name": "two\nlines"})],
     ("does_not_fit", "scene"): [lambda t: admission.check(forecast(slider()), Settings(pair_memory_bytes=1), None)],

@@ -2,6 +2,7 @@
 
 export const LINKS = ["#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#0072b2", "#f0e442", "#d55e00"];
 export const CONTACT = "#d55e00";
+export const PROVED = "#009e73";
 
 /** The value of a custom property of ciris.css, such as "--ink", as it is now: light or dark. */
 export function token(name: string): string {

@@ -8,6 +8,9 @@ export interface Space {
   q_upper: number[];
 }
 
+/** What it takes to go from q to s and back. */
+export type Charts = Pick<Space, "revolute" | "q_star">;
+
 export interface Faces {
   C: number[][];
   d: number[];
@@ -16,11 +19,11 @@ export interface Faces {
 /** A slider that stops exactly on a face may lie beyond it by rounding, so sliders stop this much earlier, in s. */
 const INSIDE = 1e-9;
 
-export function toS(space: Space, q: number[]): number[] {
+export function toS(space: Charts, q: number[]): number[] {
   return q.map((value, i) => (space.revolute[i] ? Math.tan((value - space.q_star[i]!) / 2) : value - space.q_star[i]!));
 }
 
-export function toQ(space: Space, i: number, s: number): number {
+export function toQ(space: Charts, i: number, s: number): number {
   return space.q_star[i]! + (space.revolute[i] ? 2 * Math.atan(s) : s);
 }
 

@@ -1,6 +1,7 @@
 // The robot in 3D as a component: what it holds is drawn by view.ts.
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { SceneModel } from "./schema";
+import type { PlaneDrawn } from "./square";
 import { View } from "./view";
 
 interface Props {
@@ -12,13 +13,15 @@ interface Props {
   touching?: number[];
   /** Configurations at which the links are drawn faintly as well. Give the same array again as long as it does not change. */
   ghosts?: number[][];
+  /** A plane between two geometries. Give the same object again as long as it does not change. */
+  plane?: PlaneDrawn | null;
   /** Called with the joint positions while a link is dragged. */
   onDrag?: (q: number[]) => void;
 }
 
 const NONE: number[][] = [];
 
-export function Robot({ model, q, label, touching = [], ghosts = NONE, onDrag }: Props) {
+export function Robot({ model, q, label, touching = [], ghosts = NONE, plane = null, onDrag }: Props) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const view = useRef<View | null>(null);
   const [failed, setFailed] = useState(false);
@@ -37,6 +40,7 @@ export function Robot({ model, q, label, touching = [], ghosts = NONE, onDrag }:
   useEffect(() => view.current?.setPose(q), [model, q.join()]);
   useEffect(() => view.current?.colour(touching), [model, touching.join()]);
   useEffect(() => view.current?.setGhosts(ghosts), [model, ghosts]);
+  useEffect(() => view.current?.setPlane(plane), [model, plane]);
   useEffect(() => {
     if (view.current) view.current.onDrag = onDrag ?? null;
   }, [model, onDrag]);

@@ -2,11 +2,12 @@
 import * as three from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { ConvexGeometry } from "three/examples/jsm/geometries/ConvexGeometry.js";
-import { CONTACT, LINKS, onScheme, token } from "./colours";
+import { CONTACT, LINKS, onScheme, PROVED, token } from "./colours";
 import { movingBodies, ofCondition, poses, type Matrix } from "./kinematics";
 import { Limits } from "./limits";
 import { pulled } from "./pull";
 import type { DrawnGeometry, SceneModel } from "./schema";
+import { Square, type PlaneDrawn } from "./square";
 
 const GHOST_OPACITY = 0.1;
 const MOST_GHOSTS = 300;
@@ -76,6 +77,8 @@ export class View {
   /** The body that somebody points at, in the list of bodies. */
   private pointed: string | null = null;
   private axes: Map<string, three.AxesHelper> | null = null;
+  private pair: number[] = [];
+  private square: Square | null = null; // once a plane has been drawn
   private q: number[];
 
   /** Throws where the browser cannot draw with WebGL. */
@@ -163,6 +166,15 @@ export class View {
   point(body: string | null): void {
     this.pointed = body;
     this.colour(this.touching);
+  }
+
+  /** Draws the plane between the geometries of a pair, by index, which light up; null draws none. It moves with the robot. */
+  setPlane(drawn: PlaneDrawn | null): void {
+    if (drawn && !this.square) this.scene.add((this.square = new Square()).mesh);
+    this.pair = drawn?.pair ?? [];
+    this.square?.show(drawn?.plane ?? null, this.pair.map((i) => this.drawn[i]!.mesh));
+    this.colour(this.touching);
+    this.setPose(this.q);
   }
 
   /** Draws the frames of the bodies: x red, y green, z blue. */
@@ -254,6 +266,7 @@ export class View {
       axes.matrixWorldNeedsUpdate = true;
     }
     this.limits?.setPose(found);
+    this.square?.setPose(found);
     this.draw();
   }
 
@@ -262,7 +275,7 @@ export class View {
     this.touching = touching;
     const are = new Set(touching);
     this.drawn.forEach(({ geometry, mesh, colour }, i) => {
-      const lit = are.has(i) ? CONTACT : geometry.body === this.pointed ? token("--ink") : null;
+      const lit = are.has(i) ? CONTACT : this.pair.includes(i) ? PROVED : geometry.body === this.pointed ? token("--ink") : null;
       mesh.material.color.set(are.has(i) ? CONTACT : (colour ?? token("--rest")));
       mesh.material.emissive.set(lit ?? "#000000");
       mesh.material.emissiveIntensity = lit ? 0.35 : 0;
@@ -320,6 +333,7 @@ export class View {
     this.controls.dispose();
     this.grid.dispose();
     this.limits?.dispose();
+    this.square?.dispose();
     for (const { mesh } of this.drawn) {
       mesh.geometry.dispose();
       mesh.material.dispose();

@@ -2,6 +2,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { get, said } from "../common/api";
 import { positions } from "../common/kinematics";
+import { toQ } from "../common/polytope";
 import { Robot } from "../common/robot";
 import type { Job, JobMotion, SceneModel } from "../common/schema";
 import { Player, type Shown } from "../library/player";
@@ -17,11 +18,14 @@ interface Loaded {
 
 async function load(id: string, scene: string): Promise<Loaded | null> {
   const { options, outcome, reason } = await get<Job>(`/v1/jobs/${id}`);
-  const { q, space } = options as { q?: number[][]; space?: string };
+  const { q, s } = options as { q?: number[][]; s?: number[][] };
   // A job that was cancelled, has failed or was too late has no verdict.
-  if (!q || space === "s" || !outcome || outcome === "error" || reason?.startsWith(LATE)) return null;
+  if (!(q ?? s) || !outcome || outcome === "error" || reason?.startsWith(LATE)) return null;
   const [verdict, model] = await Promise.all([get<JobMotion>(`/v1/jobs/${id}/motion`), get<SceneModel>(`/v1/scenes/${scene}/model`)]);
-  return { model, motion: shownOf({ q, t: null }, verdict) };
+  const charts = { revolute: model.units.map((unit) => unit === "rad"), q_star: model.q_star };
+  const waypoints = q ?? s!.map((row) => row.map((value, i) => toQ(charts, i, value)));
+  const motion = shownOf({ q: waypoints, t: null }, verdict);
+  return { model, motion: verdict.space === "s" ? { ...motion, charts } : motion };
 }
 
 export function Motion({ job, scene }: { job: string; scene: string }) {
@@ -32,7 +36,7 @@ export function Motion({ job, scene }: { job: string; scene: string }) {
     load(job, scene).then(setLoaded, (reason: unknown) => setProblem(said(reason)));
   }, [job, scene]);
   if (problem) return <p class="notice bad">The motion cannot be drawn: {problem}</p>;
-  if (!loaded) return null; // Or there is no verdict, or the motion is not straight in q, and only the claim says what is known of it.
+  if (!loaded) return null; // Or there is no verdict, or the motion is polynomial, and only the claim says what is known of it.
   const { model, motion } = loaded;
   return (
     <section aria-labelledby="h-motion">
@@ -41,7 +45,7 @@ export function Motion({ job, scene }: { job: string; scene: string }) {
         <Robot model={model} q={q ?? motion.q[0]!} label={`The robot of ${model.name} on the motion`} />
         <Player motion={motion} names={positions(model)} units={model.units} onMove={setQ} />
       </div>
-      <p class="quiet small">The motion is played at a speed of 1 in q, so not as your robot moves.</p>
+      <p class="quiet small">{motion.charts ? "The motion is straight in s. Between waypoints, it takes a second for each unit of their distance in q" : "The motion is played at a speed of 1 in q"}, so it is not played as your robot moves.</p>
     </section>
   );
 }

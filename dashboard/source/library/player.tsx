@@ -3,12 +3,14 @@ import type { ComponentChildren } from "preact";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { LINKS } from "../common/colours";
 import { shortNames } from "../common/kinematics";
+import { toQ, toS, type Charts } from "../common/polytope";
 import { shown } from "../common/units";
 
-/** A motion, straight in q between its configurations. The first time is 0. */
+/** A motion, straight between its configurations, in q or, where it has charts, in their s. The first time is 0. */
 export interface Motion {
   q: number[][];
   t: number[];
+  charts?: Charts;
 }
 
 /** A part of a motion, and what proves it. */
@@ -36,12 +38,14 @@ interface Props {
   onMove: (q: number[]) => void;
 }
 
-/** The configuration at a time, on the straight line in q between two of the motion's. */
-function at({ q, t }: Motion, time: number): number[] {
+/** The configuration at a time, on the straight line between two of the motion's. */
+function at({ q, t, charts }: Motion, time: number): number[] {
   const next = t.findIndex((moment) => moment >= time);
   if (next <= 0) return q[next < 0 ? q.length - 1 : 0]!;
   const share = (time - t[next - 1]!) / (t[next]! - t[next - 1]!);
-  return q[next - 1]!.map((value, i) => value + share * (q[next]![i]! - value));
+  const between = (from: number[], to: number[]): number[] => from.map((value, i) => value + share * (to[i]! - value));
+  const [from, to] = [q[next - 1]!, q[next]!];
+  return charts ? between(toS(charts, from), toS(charts, to)).map((value, i) => toQ(charts, i, value)) : between(from, to);
 }
 
 export function Player({ motion, names, units, onMove }: Props) {
@@ -101,18 +105,25 @@ function Download({ file }: { file: object }) {
 }
 
 const CHART = { width: 560, height: 140, pad: 6, band: 8 };
+const STEPS = 24; // of the curves of a piece that is not straight in q
 const DASHES = ["", "6 3", "2 3", "8 3 2 3", "1 4", "10 4", "4 2"];
+
+function finer(t: number[]): number[] {
+  return t.flatMap((end, i) => (i === 0 ? [end] : Array.from({ length: STEPS }, (_, step) => t[i - 1]! + ((step + 1) / STEPS) * (end - t[i - 1]!))));
+}
 
 function Curves({ motion, parts, names, units, time }: { motion: Motion; parts: Part[]; names: string[]; units: ("rad" | "m")[]; time: number }) {
   const end = Math.max(motion.t.at(-1)!, 1e-9);
   const short = shortNames(names);
   const x = (t: number): number => CHART.pad + ((CHART.width - 2 * CHART.pad) * t) / end;
+  const times = useMemo(() => (motion.charts ? finer(motion.t) : motion.t), [motion]);
+  const places = useMemo(() => times.map((moment) => at(motion, moment)), [motion, times]);
   const lines = names.map((_, joint) => {
-    const values = motion.q.map((q) => q[joint]!);
+    const values = places.map((q) => q[joint]!);
     const [low, high] = values.reduce(([least, most], value) => [Math.min(least, value), Math.max(most, value)], [Infinity, -Infinity]);
     const bottom = CHART.height - CHART.band - CHART.pad;
     const y = (value: number): number => bottom - (bottom - CHART.pad) * (high - low > 1e-9 ? (value - low) / (high - low) : 0.5);
-    return { d: motion.t.map((t, i) => `${i ? "L" : "M"}${x(t).toFixed(1)},${y(values[i]!).toFixed(1)}`).join(""), from: values[0]!, to: values.at(-1)! };
+    return { d: times.map((t, i) => `${i ? "L" : "M"}${x(t).toFixed(1)},${y(values[i]!).toFixed(1)}`).join(""), from: values[0]!, to: values.at(-1)! };
   });
   return (
     <figure>

@@ -9,6 +9,8 @@ import type { Partition, RegionConfigurations, RegionDetail, RegionPair, RegionP
 import { ofCondition } from "../common/kinematics";
 import { Slice } from "../common/slice";
 import { Sliders } from "../common/sliders";
+import { PlaneText, usePlane } from "./plane";
+import { SaveAsHtml } from "./save";
 
 /** The keys of a manifest that the page needs. */
 interface Manifest {
@@ -61,8 +63,10 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
   const ghosts = useMemo(() => (swept ? configurations.samples.slice(0, GHOSTS) : []), [swept, configurations]);
   const names = shortNames(space.joints);
   const inside = contains(space, faces, q);
+  const plane = usePlane(id, model, space, pair, q, inside);
   const bodies = pairs.filter(({ a, b }) => !ofCondition(a) && !ofCondition(b)).length;
   const kept = bodies < pairs.length ? ", and the conditions hold" : "";
+  const proved = `The robot is inside the region: no collision of the ${bodies === 1 ? "covered pair" : `${bodies} covered pairs`}${kept}, as proved.`;
 
   useEffect(() => {
     setCells(null);
@@ -84,17 +88,18 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
     <section aria-labelledby="h-explore" class="explore">
       <h2 id="h-explore">Look inside</h2>
       <InClaim place="now">
-        <p role="status" class={inside ? "proved" : "inside not"}>{inside ? `The robot is inside the region: no collision of the ${bodies === 1 ? "covered pair" : `${bodies} covered pairs`}${kept}, as proved.` : "The robot is outside the region: nothing is proved here."}</p>
+        <p role="status" class={inside ? "proved" : "inside not"}>{inside ? proved : "The robot is outside the region: nothing is proved here."}</p>
       </InClaim>
       <div class="toolbar">
         <button type="button" aria-pressed={playing} onClick={() => setPlaying(!playing)}>{playing ? "Pause" : "Sweep through the region"}</button>
         <button type="button" onClick={() => go(configurations.center)}>Centre</button>
         {configurations.seed && <button type="button" onClick={() => go(configurations.seed!)}>Seed</button>}
         <label><input type="checkbox" checked={swept} onChange={(event) => setSwept(event.currentTarget.checked)} /> show {GHOSTS} samples</label>
+        <SaveAsHtml region={id} saved={{ model, space, faces, q, proved }} />
       </div>
       <div class="views">
         <div class="stay">
-          <Robot model={model} q={q} ghosts={ghosts} label={`The robot of ${model.name} inside the region${swept ? `, with ${GHOSTS} samples of it` : ""}`} />
+          <Robot model={model} q={q} ghosts={ghosts} plane={plane.drawn} label={`The robot of ${model.name} inside the region${swept ? `, with ${GHOSTS} samples of it` : ""}`} />
           <div class="joints">
             <Sliders names={space.joints} units={model.units} lower={space.q_lower} upper={space.q_upper} allowed={inside ? rooms(space, faces, q) : undefined} q={q} onChange={go} />
             <div class="ends" role="group" aria-label="Ends of each joint within the region">
@@ -119,6 +124,7 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
               ))}
             </select>
           </label>
+          <PlaneText shown={plane} pair={pair} inside={inside} />
           {cellsProblem && <p class="notice bad">{cellsProblem}</p>}
         </div>
       </div>
