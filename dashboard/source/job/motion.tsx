@@ -2,7 +2,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { get, said } from "../common/api";
 import { positions } from "../common/kinematics";
-import { Robot } from "../common/robot";
+import { Robot } from "../common/drawn";
 import type { Job, JobMotion, SceneModel } from "../common/schema";
 import { Player, type Shown } from "../library/player";
 import { shownOf } from "../library/upload";

@@ -1,0 +1,1 @@
+var n=["#56b4e9","#e69f00","#009e73","#cc79a7","#0072b2","#f0e442","#d55e00"],r="#d55e00";function o(e){return getComputedStyle(document.documentElement).getPropertyValue(e).trim()}function c(e){let t=matchMedia("(prefers-color-scheme: dark)");return t.addEventListener("change",e),()=>t.removeEventListener("change",e)}export{n as a,r as b,o as c,c as d};
