@@ -27,6 +27,8 @@ _VERDICT: dict[str, Any] = {
     "guarantee": "exact",
     "certified_to": {"piece": 0, "time": 1.0, "q": [0.1]},
     "proved_distance": 0.01,
+    "margin": 0.01,
+    "proof": None,
     "clearance": None,
     "tube": None,
     "stop": None,
@@ -41,7 +43,10 @@ def addresses(client: TestClient, database: Database, scene: Scene, region: str,
     with database.write() as session:
         workers.tell(session, Made(leases.name_of(os.getppid()), WorkerKind.SOLVE, "1.2", 4, 8, 2**34), WorkerState.RUNNING)
     job = client.get("/v1/jobs").json()["jobs"][0]["id"]
-    other, motion = store_region(database, certified), motion_job(database, scene, _VERDICT | {"scene": {"name": "slider", "hash": scene.hash}})
+    other, motion = (
+        store_region(database, certified),
+        motion_job(database, scene, _VERDICT | {"scene": {"name": "slider", "hash": scene.hash}}),
+    )
     ids = [f"/jobs/{job}", f"/jobs/{motion}", "/scenes", "/scenes/slider", f"/regions/{region}", f"/compare?a={region}&b={other}"]
     return dict(zip(NAMES, ["/", "/new?scene=slider", *ids, "/project", "/workers", "/login", "/jobs/none"], strict=True))
 

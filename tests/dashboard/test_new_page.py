@@ -169,7 +169,9 @@ def test_what_stands_between_configurations_to_contain_is_said_before_a_job_begi
     opened.get_by_text("No collision (computed").wait_for()
     opened.get_by_role("button", name="Add this configuration").click()
     set_joint(opened, "arm/joint1", 0)
-    said = opened.get_by_role("alert").filter(has_text="One region cannot contain both ends of the straight line in s from this configuration")
+    said = opened.get_by_role("alert").filter(
+        has_text="One region cannot contain both ends of the straight line in s from this configuration"
+    )
     said.wait_for()
     assert "obstacle" in said.text_content()
     start.click()
