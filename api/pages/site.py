@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from fastapi import APIRouter, FastAPI
 from fastapi.responses import HTMLResponse
-from fastapi.staticfiles import StaticFiles
 
 from api.access import READ
 from api.pages import comparison, form, home, job, project, region, scene, workers
+from api.pages.assets import Assets
 from api.pages.rendering import ROOT
 
 
@@ -17,4 +17,4 @@ def install(app: FastAPI) -> None:
     for part in (comparison, form, home, job, project, region, scene, workers):
         pages.include_router(part.router)
     app.include_router(pages)
-    app.mount("/static", StaticFiles(directory=ROOT / "static"), name="static")
+    app.mount("/static", Assets(directory=ROOT / "static"), name="static")

@@ -71,6 +71,36 @@ def test_a_folder_is_taken_as_it_is(page: Any, url: str, client: TestClient) -> 
     page.get_by_text("planar-2dof is stored, with 2 joints and 6 pairs").wait_for()
 
 
+def drop(page: Any, place: Any, path: Path) -> None:
+    """Drops a file or a folder on the page, as the file manager of a desktop does."""
+    box = place.bounding_box()
+    at = {"x": box["x"] + 5, "y": box["y"] + 5}
+    dragged = {"items": [], "files": [str(path)], "dragOperationsMask": 1}
+    tools = page.context.new_cdp_session(page)
+    for step in ("dragEnter", "dragOver", "drop"):
+        tools.send("Input.dispatchDragEvent", {"type": step, **at, "data": dragged})
+
+
+@pytest.mark.parametrize("place", ["main h1", ".choose"])
+def test_a_folder_that_is_dropped_anywhere_is_taken_with_all_below_it(page: Any, url: str, tmp_path: Path, place: str) -> None:
+    given = tmp_path / "cell"
+    shutil.copytree(ROOT / "examples" / "arm_3dof", given / "models")
+    shutil.move(given / "models" / "scene.yaml", given / "scene.yaml")
+    text = (given / "scene.yaml").read_text()
+    (given / "scene.yaml").write_text(text.replace("file: ", "file: models/"))
+    page.goto(f"{url}/new")
+    page.get_by_label("or upload one").wait_for()
+    drop(page, page.locator(place).first, given)
+    page.get_by_text("is stored, with 3 joints").wait_for()
+
+
+def test_a_urdf_that_is_dropped_is_taken_as_it_is(page: Any, url: str) -> None:
+    page.goto(f"{url}/new")
+    page.get_by_label("or upload one").wait_for()
+    drop(page, page.locator(".choose"), ARM)
+    page.get_by_text("arm is stored, with 3 joints").wait_for()
+
+
 def zipped(directory: Path) -> bytes:
     data = io.BytesIO()
     with zipfile.ZipFile(data, "w") as archive:

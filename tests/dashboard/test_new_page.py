@@ -161,6 +161,45 @@ def test_configurations_are_marked_to_be_connected(opened: Any, url: str, client
     assert job["options"]["coverage"] is None
 
 
+def test_what_stands_between_configurations_to_contain_is_said_before_a_job_begins(opened: Any, url: str, client: TestClient) -> None:
+    """The second link passes the box on the straight line between the two, and at neither end."""
+    start = opened.get_by_role("button", name="Start the job")
+    set_joint(opened, "arm/joint1", 65)
+    set_joint(opened, "arm/joint2", 0)
+    opened.get_by_text("No collision (computed").wait_for()
+    opened.get_by_role("button", name="Add this configuration").click()
+    set_joint(opened, "arm/joint1", 0)
+    said = opened.get_by_role("alert").filter(
+        has_text="One region cannot contain both ends of the straight line in s from this configuration"
+    )
+    said.wait_for()
+    assert "obstacle" in said.text_content()
+    start.click()
+    opened.wait_for_timeout(1000)
+    assert jobs(client) == []
+    said.get_by_role("button", name="Connect them with several regions").click()
+    start.click()
+    opened.wait_for_url(f"{url}/jobs/*")
+    (job,) = jobs(client)
+    assert job["kind"] == "cover"
+    assert job["options"]["connect"] == [pytest.approx([0.0, 0.0]), pytest.approx([np.deg2rad(65), 0.0])]
+
+
+def test_a_configuration_to_contain_that_is_not_free_is_named(opened: Any, client: TestClient) -> None:
+    set_joint(opened, "arm/joint1", 34)
+    set_joint(opened, "arm/joint2", 0)
+    opened.get_by_text("Not free").wait_for()
+    opened.get_by_role("button", name="Add this configuration").click()
+    set_joint(opened, "arm/joint1", -30)
+    said = opened.get_by_role("alert").filter(has_text="No region can contain configuration 1")
+    said.wait_for()
+    opened.get_by_role("button", name="Start the job").click()
+    opened.wait_for_timeout(1000)
+    assert jobs(client) == []
+    opened.get_by_role("button", name="remove").click()
+    said.wait_for(state="detached")
+
+
 def test_a_map_is_asked_for(opened: Any, url: str, client: TestClient) -> None:
     opened.get_by_text("Map the scene").click()
     opened.get_by_label("Coverage").fill("0.7")

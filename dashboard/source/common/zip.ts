@@ -41,10 +41,42 @@ export function zip(entries: Entry[]): Blob {
   return new Blob([...parts, ...directory, bytes([0x06054b50, 4], [0, 2], [0, 2], [entries.length, 2], [entries.length, 2], [size, 4], [at, 4], [0, 2])]);
 }
 
+/** A file with its path: below the folder that was chosen or dropped, if it was one. */
+export interface Chosen {
+  path: string;
+  file: File;
+}
+
+/** What a field for files has. */
+export function chosen(files: FileList | null): Chosen[] {
+  return [...(files ?? [])].map((file) => ({ path: file.webkitRelativePath || file.name, file }));
+}
+
+/** All files that were dropped, those below dropped folders too. */
+export async function dropped(data: DataTransfer): Promise<Chosen[]> {
+  // The entries can be taken only while the event is handled, before anything is waited for.
+  const entries = [...data.items].flatMap((item) => item.webkitGetAsEntry() ?? []);
+  return (await Promise.all(entries.map(below))).flat();
+}
+
+async function below(entry: FileSystemEntry): Promise<Chosen[]> {
+  const path = entry.fullPath.slice(1);
+  if (entry.isFile) return [{ path, file: await new Promise((done, fail) => (entry as FileSystemFileEntry).file(done, fail)) }];
+  const reader = (entry as FileSystemDirectoryEntry).createReader();
+  const found: FileSystemEntry[] = [];
+  // A reader gives some entries at a time, and none at the end.
+  for (let some = null; some === null || some.length > 0; found.push(...some)) some = await new Promise<FileSystemEntry[]>((done, fail) => reader.readEntries(done, fail));
+  return (await Promise.all(found.map(below))).flat();
+}
+
+/** What somebody would call all of it: the name of the folder, or of the first file. */
+export function nameOf([first]: Chosen[]): string {
+  return first!.path.split("/")[0]!;
+}
+
 /** The file to send for what somebody has chosen: a zip as it is, and anything else in a zip. */
-export async function packed(files: File[]): Promise<File> {
-  const [first] = files;
-  if (files.length === 1 && first!.name.toLowerCase().endsWith(".zip")) return first!;
-  const entries = await Promise.all(files.map(async (file) => ({ path: file.webkitRelativePath || file.name, data: new Uint8Array(await file.arrayBuffer()) })));
-  return new File([zip(entries)], `${first!.webkitRelativePath.split("/")[0] || first!.name}.zip`, { type: "application/zip" });
+export async function packed(files: Chosen[]): Promise<File> {
+  if (files.length === 1 && files[0]!.path.toLowerCase().endsWith(".zip")) return files[0]!.file;
+  const entries = await Promise.all(files.map(async ({ path, file }) => ({ path, data: new Uint8Array(await file.arrayBuffer()) })));
+  return new File([zip(entries)], `${nameOf(files)}.zip`, { type: "application/zip" });
 }

@@ -18,7 +18,7 @@ import { Workers } from "./workers";
 function Moved(props: { job: string; scene: string }) {
   const [Motion, setMotion] = useState<ComponentType<typeof props> | null>(null);
   useEffect(() => void import("./motion").then((module) => setMotion(() => module.Motion)), []);
-  return Motion && <Motion {...props} />;
+  return Motion ? <Motion {...props} /> : <div class="coming" />;
 }
 
 export function JobIsland({ job, subject, scene, ended, begun, units }: { job: string; subject: string; scene: string; ended: boolean; begun: number; units: Unit[] }) {

@@ -2,8 +2,8 @@
 import { useEffect, useState } from "preact/hooks";
 import { get, said } from "../common/api";
 import { positions } from "../common/kinematics";
+import { Robot } from "../common/drawn";
 import { toQ } from "../common/polytope";
-import { Robot } from "../common/robot";
 import type { Job, JobMotion, SceneModel } from "../common/schema";
 import { Player, type Shown } from "../library/player";
 import { shownOf } from "../library/upload";
@@ -29,14 +29,15 @@ async function load(id: string, scene: string): Promise<Loaded | null> {
 }
 
 export function Motion({ job, scene }: { job: string; scene: string }) {
-  const [loaded, setLoaded] = useState<Loaded | null>(null);
+  const [loaded, setLoaded] = useState<Loaded | null | undefined>(undefined);
   const [problem, setProblem] = useState<string | null>(null);
   const [q, setQ] = useState<number[] | null>(null);
   useEffect(() => {
     load(job, scene).then(setLoaded, (reason: unknown) => setProblem(said(reason)));
   }, [job, scene]);
   if (problem) return <p class="notice bad">The motion cannot be drawn: {problem}</p>;
-  if (!loaded) return null; // Or there is no verdict, or the motion is polynomial, and only the claim says what is known of it.
+  if (loaded === undefined) return <div class="coming" />;
+  if (!loaded) return null; // There is no verdict, or the motion is polynomial, and only the claim says what is known of it.
   const { model, motion } = loaded;
   return (
     <section aria-labelledby="h-motion">

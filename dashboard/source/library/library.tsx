@@ -5,7 +5,7 @@ import { InClaim } from "../common/claim";
 import { positions } from "../common/kinematics";
 import { MomentText, touchingOf, useMoment } from "../common/moment";
 import type { Space } from "../common/polytope";
-import { Robot } from "../common/robot";
+import { Robot } from "../common/drawn";
 import type { Approach, GraphResponse, RegionConfigurations, SceneModel } from "../common/schema";
 import { Slice } from "../common/slice";
 import { Sliders } from "../common/sliders";

@@ -1,7 +1,7 @@
 // The scene to work on: one that is stored, or one that is uploaded now.
-import { useState } from "preact/hooks";
+import { useEffect, useState } from "preact/hooks";
 import { said, upload } from "../common/api";
-import { packed } from "../common/zip";
+import { chosen as chosenFiles, dropped, nameOf, packed, type Chosen } from "../common/zip";
 import type { SceneDetail, SceneModel } from "../common/schema";
 
 export type Scene = Pick<SceneDetail, "id" | "name" | "names" | "joints" | "pairs" | "warnings">;
@@ -28,9 +28,9 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
   const offers = scenes.flatMap((scene) => scene.names.map((name) => ({ ...scene, name })));
   // An address may give a scene otherwise, such as by its id.
   if (model && chosen !== null && !offers.some(({ name }) => name === chosen)) offers.unshift({ id: model.scene, name: chosen, names: [], joints: model.q_star.length, pairs: model.pairs.length, warnings: 0 });
-  const send = async (files: File[]): Promise<void> => {
+  const send = async (files: Chosen[]): Promise<void> => {
     if (files.length === 0) return;
-    const name = files[0]!.webkitRelativePath.split("/")[0] || files[0]!.name;
+    const name = nameOf(files);
     setSending(name);
     setProblem(null);
     setAdded(null);
@@ -43,12 +43,23 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
     }
     setSending(null);
   };
-  const drop = (event: DragEvent): void => {
-    event.preventDefault();
-    void send([...(event.dataTransfer?.files ?? [])]);
-  };
+  // A scene may be dropped anywhere, but where the form asks for another file.
+  useEffect(() => {
+    const over = (event: DragEvent): void => event.preventDefault();
+    const drop = (event: DragEvent): void => {
+      if (event.defaultPrevented || !event.dataTransfer) return;
+      event.preventDefault();
+      void dropped(event.dataTransfer).then(send, (reason: unknown) => setProblem(`What was dropped cannot be read: ${String(reason)}`));
+    };
+    document.addEventListener("dragover", over);
+    document.addEventListener("drop", drop);
+    return () => {
+      document.removeEventListener("dragover", over);
+      document.removeEventListener("drop", drop);
+    };
+  }, [onUpload]);
   return (
-    <div class="choose card" onDragOver={(event) => event.preventDefault()} onDrop={drop}>
+    <div class="choose card">
       <p>
         <label for="new-scene">Scene</label>
         <select id="new-scene" value={chosen ?? ""} onChange={(event) => onChoose(event.currentTarget.value)} disabled={offers.length === 0}>
@@ -60,12 +71,12 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
       </p>
       <p>
         <label for="new-upload">or upload one</label>
-        <input id="new-upload" type="file" accept=".zip,.urdf,.sdf,.mjcf,application/zip" disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void send([...(event.currentTarget.files ?? [])])} />
+        <input id="new-upload" type="file" accept=".zip,.urdf,.sdf,.mjcf,application/zip" disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void send(chosenFiles(event.currentTarget.files))} />
         <label for="new-folder">or its folder</label>
-        <input id="new-folder" type="file" {...{ webkitdirectory: true }} disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void send([...(event.currentTarget.files ?? [])])} />
+        <input id="new-folder" type="file" {...{ webkitdirectory: true }} disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void send(chosenFiles(event.currentTarget.files))} />
       </p>
       <p class="quiet small" id="new-upload-says">
-        A folder, or a zip of it, with <code>scene.yaml</code> and every model and mesh that it refers to. Or a robot alone: its URDF, SDFormat or MJCF file, or a folder that has one and its meshes; the service then drafts the scene, as <code>ciris scene init</code> does. Drop it here.
+        A folder, or a zip of it, with <code>scene.yaml</code> and every model and mesh that it refers to. Or a robot alone: its URDF, SDFormat or MJCF file, or a folder that has one and its meshes; the service then drafts the scene, as <code>ciris scene init</code> does. Or drop it anywhere on this page.
       </p>
       <div role="status">
         {sending && <p class="notice">Reading {sending} …</p>}

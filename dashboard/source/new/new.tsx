@@ -3,12 +3,13 @@ import { useEffect, useMemo, useState } from "preact/hooks";
 import { get, post, said, ServiceError } from "../common/api";
 import { positions } from "../common/kinematics";
 import { MomentText, touchingOf, useMoment } from "../common/moment";
-import { Robot } from "../common/robot";
+import { Robot } from "../common/drawn";
 import type { ContactsResponse, Job, PlanResponse, SceneDetail, SceneModel, ScenePage } from "../common/schema";
 import { Sliders } from "../common/sliders";
 import { ChooseScene, named, type Scene } from "./choose";
 import type { Refused } from "./options";
 import { asked, type Start as First } from "./again";
+import { blocked, useBlocked } from "./blocked";
 import { Copies } from "./copies";
 import { isMarked, missing, request, type Parts, type Wish } from "./request";
 import { Wishes } from "./wishes";
@@ -91,6 +92,8 @@ function Start({ given, model, parts, keyed, first }: Props & { given: string; m
   const moment = useMoment(model.scene, q);
   const touching = useMemo(() => touchingOf(model, moment), [model, moment]);
   const body = request(model.scene, q, wish, parts);
+  const held = wish.kind === "grow" ? [q, ...wish.marks] : [];
+  const between = useBlocked(model, held);
 
   useEffect(() => history.replaceState(null, "", withUnits(new URLSearchParams({ scene: given, q: q.map((value) => Number(value.toFixed(4))).join(",") }))), [model, q.join()]);
 
@@ -139,6 +142,11 @@ function Start({ given, model, parts, keyed, first }: Props & { given: string; m
         setSending(false);
         return setProblem("The robot is in collision there, so no region can hold the configuration. Move it first.");
       }
+      const stands = await blocked(model, held);
+      if (stands) {
+        setSending(false);
+        return setProblem(between ? null : stands);
+      }
       const job = await post<Job>("/v1/jobs", body);
       location.assign(`/jobs/${job.id}`);
     } catch (reason) {
@@ -179,7 +187,10 @@ function Start({ given, model, parts, keyed, first }: Props & { given: string; m
       </div>
       <form onSubmit={(event) => void submit(event)}>
         <Wishes wish={wish} parts={parts[wish.kind]} refused={refused} onWish={change} marks={wish.marks.map((mark) => asText(mark, model.units))} here={isMarked(wish, q)} onMark={() => change({ ...wish, marks: [...wish.marks, q] })} onGo={(mark) => setQ(wish.marks[mark]!)} />
-        <div role="alert">{problem && <p class="notice bad">{problem}</p>}</div>
+        <div role="alert">
+          {between && <p class="notice bad">{between} <button type="button" class="plain" onClick={() => change({ ...wish, kind: "cover", goal: "connect", marks: held })}>Connect them with several regions</button></p>}
+          {problem && <p class="notice bad">{problem}</p>}
+        </div>
         <p><button type="submit" class="primary" disabled={sending}>{sending ? "Starting …" : "Start the job"}</button></p>
         <Copies q={q} wish={wish} parts={parts} keyed={keyed} body={body} />
       </form>

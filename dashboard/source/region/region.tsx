@@ -4,7 +4,7 @@ import { get, said } from "../common/api";
 import { InClaim } from "../common/claim";
 import { shortNames } from "../common/kinematics";
 import { contains, rooms, toQ, toS, type Faces, type Space } from "../common/polytope";
-import { Robot } from "../common/robot";
+import { Robot } from "../common/drawn";
 import type { Partition, RegionConfigurations, RegionDetail, RegionPair, RegionPairs, SceneModel } from "../common/schema";
 import { ofCondition } from "../common/kinematics";
 import { Slice } from "../common/slice";

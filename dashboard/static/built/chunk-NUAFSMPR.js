@@ -1,0 +1,1 @@
+var n=["#56b4e9","#e69f00","#009e73","#cc79a7","#0072b2","#f0e442","#d55e00"],o="#d55e00",r="#009e73";function c(e){return getComputedStyle(document.documentElement).getPropertyValue(e).trim()}function d(e){let t=matchMedia("(prefers-color-scheme: dark)");return t.addEventListener("change",e),()=>t.removeEventListener("change",e)}export{n as a,o as b,r as c,c as d,d as e};
