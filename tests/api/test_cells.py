@@ -436,6 +436,24 @@ def test_the_plane_of_a_cell_is_between_the_bodies(client: TestClient, worker: N
     assert len(met) > len(scene.pairs), "several cells of a pair are met"
 
 
+def test_the_plane_of_all_of_a_region_is_between_the_bodies(ask: Ask, planar: Scene, planar_region: str) -> None:
+    """A program's plane is affine in u, whose origin is not that of s and whose unit is another; what is served is affine in s."""
+    scene, region = planar, planar_region
+    assert [pair["kind"] for pair in ask(f"regions/{region}/pairs")["pairs"]] == ["program"] * len(scene.pairs)
+    manifest = ask(f"regions/{region}")["manifest"]
+    lower, upper = (np.array(manifest["bounding_box"][name]) for name in ("lower", "upper"))
+    assert (np.abs(lower + upper) > 0.05).all(), "the middle is not at s = 0"
+    samples = ask(f"regions/{region}/configurations?samples=60")["samples"]
+    for index in range(len(scene.pairs)):
+        planes = [ask(f"regions/{region}/pairs/{index}/plane?" + "&".join(f"q={value}" for value in q)) for q in samples]
+        assert all((plane["cell"], plane["Z"]) == (0, planes[0]["Z"]) for plane in planes), "one plane serves everywhere"
+        assert planes[0]["joints"] == [*range(scene.n)]
+        assert np.abs(np.array(planes[0]["Z"])[:, 1:]).max() > 1e-6, "it moves with the joints"
+        for q in samples:
+            first, second = sides_of(scene, planes[0], scene.to_s(np.array(q)))
+            assert first > 0 > second
+
+
 def test_outside_of_the_region_no_plane_is_proved(client: TestClient, region: str, ask: Ask) -> None:
     for q, code in (("q=2.0", "cells_not_found"), ("q=999", "cells_not_found"), ("q=0&q=0", "wrong_length")):
         refused = client.get(f"/v1/regions/{region}/pairs/0/plane?{q}")
