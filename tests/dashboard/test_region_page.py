@@ -227,6 +227,15 @@ def test_the_square_is_in_the_plane_that_the_proof_has_at_the_joint_positions(
     assert np.abs(normals[0] - normals[1]).max() > 1e-3, "it has moved"
 
 
+def test_the_cells_of_a_pair_of_a_job_lead_to_its_planes(page: Any, url: str, planar_region: str, client: TestClient) -> None:
+    job = client.get(f"/v1/regions/{planar_region}").json()["job"]
+    page.goto(f"{url}/jobs/{job}#pair=0")
+    page.get_by_role("link", name=f"region {planar_region[:8]}").click()
+    page.locator(".plane-said").get_by_text("the plane of cell").wait_for()
+    assert page.url == f"{url}/regions/{planar_region}#pair=0"
+    assert page.locator(".robot canvas").evaluate("one => one.getBoundingClientRect().top < innerHeight / 2"), "the robot is in view"
+
+
 def test_an_address_chooses_the_pair(page: Any, url: str, planar: Scene, planar_region: str) -> None:
     for fragment, chosen in (("#pair=0", "0"), ("#pair=99", ""), ("#pair=", ""), ("", "")):
         page.goto("about:blank")
