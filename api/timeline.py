@@ -1,8 +1,7 @@
 """This module tells what processes have done for a job over time, from the job's events.
 
 An event of pairs comes when they are saved, and names what a process did one after the other. So the last of them ended then, and each
-began when the one before it ended. A step ended when its event came. The work that processes did for the leader of a map is told by its
-notes.
+began when the one before it ended. A step ended when its event came. The notes of a map's leader say what processes did for it.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from db.session import Database
 from db.states import IterationState
 
 ENOUGH = 20
-"""Before so many pieces of an iteration are settled, nothing is said of the time that is left."""
+"""Until this many pieces of an iteration are settled, the time that is left is null."""
 SHORTEST = 1e-6
 """A part of the time lasts at least this many seconds."""
 PAIRS, LOST, SHARED = "pairs", "lost", "piece"

@@ -23,12 +23,12 @@ router = APIRouter()
 
 ABSENT = "\N{EN DASH}"
 LISTED = 100
-"""At most so many names of each kind are listed."""
+"""The page lists at most this many names of each kind."""
 
 
 @router.get("/compare/jobs", dependencies=[KNOWN_TO_PAGE])
 def compare_jobs_page(request: Request, a: str, b: str, db: Db) -> Response:
-    """Shows two jobs side by side: what they were asked for differently, and what came of it."""
+    """Shows two jobs side by side: how their requests differ, and with what results."""
     both = [jobs.get_job(job_id, db) for job_id in (a, b)]
     with db.read() as session:
         spent, begun = ([look(session, job.id) for job in both] for look in (pairs.seconds, pairs.begun))

@@ -416,8 +416,8 @@ def get_job_timeline(
 ) -> Timeline:
     """Returns what each process has done for a job, when, how fast the work went, and how long the iteration that runs will last.
 
-    Of a long time with much work, it tells several pieces of work together. Ask for a part of the time to see each of them. A job that
-    has ended for long may have lost its events, and then nothing is told.
+    Where much work was done, one bar stands for several pieces of it. Ask for a part of the time to see each piece. The service may
+    have removed the events of a job that ended long ago; then the timeline is empty.
     """
     return timeline.of_job(db, job_id, since, until)
 

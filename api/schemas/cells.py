@@ -152,7 +152,10 @@ class SeparatingPlane(BaseModel):
     )
 
     pair: PairInfo = Field(description="The pair.")
-    cell: int = Field(description="Number of the cell: of its node in the tree of the pair's proof, in preorder.")
+    cell: int = Field(
+        description="Number of the cell: of its node in the tree of the pair's proof, in preorder. Where `nodes` of the pair's cells has a "
+        "-4, the answer with the cells does not show the whole tree, and its nodes have other numbers. Then compare `lower` and `upper`."
+    )
     lower: list[float] = Field(description="(n,) lower corner of the cell, in s.")
     upper: list[float] = Field(description="(n,) upper corner of the cell, in s.")
     volumes: tuple[str, str] = Field(description="In words, what the plane separates: `a` and `b`, or simpler volumes that contain them.")

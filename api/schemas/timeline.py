@@ -7,11 +7,11 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field
 
 MOST_BARS = 1500
-"""Pieces of work are told one by one up to this many."""
+"""A timeline shows up to this many pieces of work one by one."""
 MOST_PROCESSES = 60
-"""Bars of at most this many processes are told, those that worked longest."""
+"""A timeline shows at most this many processes, those that worked longest."""
 BINS = 120
-"""Where there are more pieces, they are told together in this many parts of the time."""
+"""Where there are more pieces, a timeline sums them up in this many parts of the time."""
 
 _LEFT: dict[str, Any] = {"iteration": 3, "seconds": 8.1, "error": 1.2, "settled": 30, "left": 14}
 _PROCESS = "solver-1.2f9a01c3:4711:8812734"
@@ -27,8 +27,8 @@ class Bar(BaseModel):
     work: str = Field(
         description="`pairs` for a pair or a part of one; else the kind of the step, or `lost` where the process lost its work."
     )
-    state: str = Field(description="What became of it; of several pieces, what became of those that took longest.")
-    pieces: int = Field(description="How many pieces it tells of.")
+    state: str = Field(description="How it ended; of several pieces, how those ended that took longest.")
+    pieces: int = Field(description="How many pieces it stands for.")
     iteration: int | None = Field(description="The iteration of a single pair; else null.")
     pair: int | None = Field(description="The index of a single pair; else null.")
 
@@ -98,18 +98,18 @@ class Timeline(BaseModel):
     )
 
     seconds: float = Field(description="Seconds from the job's start to its end, or until now.")
-    begin: float = Field(description="Where the time that is told begins, in seconds since the job's start.")
+    begin: float = Field(description="Where the time that it shows begins, in seconds since the job's start.")
     end: float = Field(description="Where it ends.")
     processes: list[str] = Field(
         description="The processes that worked in this time: host, process number and start. The name is empty for work of which an "
         "earlier version has not kept who did it."
     )
-    others: int = Field(description=f"Number of further processes, which worked less and are left out; at most {MOST_PROCESSES} are told.")
+    others: int = Field(description=f"Number of further processes, which worked less and are left out; it shows at most {MOST_PROCESSES}.")
     bars: list[Bar] = Field(description="What they did, by process and time.")
     together: bool = Field(
-        description=f"Whether the bars tell of several pieces each, in {BINS} parts of the time, because there are more than {MOST_BARS}."
+        description=f"Whether the bars stand for several pieces each, in {BINS} parts of the time, because there are more than {MOST_BARS}."
     )
-    rates: list[Rate] = Field(description="How fast the work went, in parts of the time; empty where no pair and no cell was told of.")
+    rates: list[Rate] = Field(description="How fast the work went, in parts of the time; empty where no process reported a pair or a cell.")
     left: TimeLeft | None = Field(
         description="How long the iteration that runs will last; null where none runs, and before 20 of its pieces are settled.",
         examples=[_LEFT],

@@ -26,7 +26,8 @@ from db.models import JobRow, SubtreesRow
 from db.session import Database
 from db.states import PairState, StepState
 from db.types import utcnow
-from tests.certifier.scenes import ball, box, planar_arm
+from tests.api.conftest import certified_polytope, store_region
+from tests.certifier.scenes import ball, box, cube, planar_arm
 from tests.db.builders import add_iteration
 from tests.scenes import box_seed, slider
 
@@ -434,6 +435,24 @@ def test_the_plane_of_a_cell_is_between_the_bodies(client: TestClient, worker: N
                 assert first > 0 > second
             met.add((index, plane["cell"]))
     assert len(met) > len(scene.pairs), "several cells of a pair are met"
+
+
+def test_the_plane_of_all_of_a_region_is_between_the_bodies(database: Database, ask: Ask) -> None:
+    """A program's plane is affine in u, whose origin and unit are not those of s; what is served is affine in s.
+
+    The tip passes the block closely: a plane that is read in u, or moved by a part of the conversion, cuts one of the two.
+    """
+    scene = stored(database, replace(passing(), pairs=passing().pairs[-1:]))
+    polytope, center = cube(scene, 0.3, 0.3), np.full(scene.n, 0.3)
+    region = store_region(database, certified_polytope(scene, polytope, center))
+    assert [pair["kind"] for pair in ask(f"regions/{region}/pairs")["pairs"]] == ["program"]
+    served = []
+    for s in np.random.default_rng(0).uniform(0.0, 0.6, (60, scene.n)):
+        plane = ask(f"regions/{region}/pairs/0/plane?" + "&".join(f"q={value}" for value in scene.to_q(s)))
+        first, second = sides_of(scene, plane, s)
+        assert first > 0 > second
+        served.append((plane["cell"], plane["joints"], plane["Z"]))
+    assert served == [(0, [0, 1], served[0][2])] * 60, "one plane serves everywhere"
 
 
 def test_outside_of_the_region_no_plane_is_proved(client: TestClient, region: str, ask: Ask) -> None:

@@ -9,12 +9,23 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from certifier.model import Array, Scene
+from certifier.kinematics import Kinematics
+from certifier.model import WORLD, Array, Scene
 from certifier.pair.collisions import in_collision
 from certifier.verify.decimals import at_least_mm
 from tests.dashboard.test_truth import until
 
 READY = "The robot is inside the region"
+OBSERVE = """
+window.__THREE_DEVTOOLS__ = new EventTarget();
+__THREE_DEVTOOLS__.addEventListener("observe", ({ detail }) => { if (detail.isScene) window.inView = detail; });
+"""
+"""three.js tells whoever looks for faults of its scenes."""
+DRAWN = """() => {
+    const found = [];
+    inView.traverse((one) => { if (one.geometry?.type === "PlaneGeometry") found.push([one.visible, one.matrixWorld.elements]); });
+    return found;
+}"""
 
 
 @pytest.fixture
@@ -183,6 +194,55 @@ def test_the_plane_of_the_cell_is_drawn_between_the_bodies_and_moves(opened: Any
     opened.locator(".slice canvas").click(position={"x": 300, "y": 60})
     opened.get_by_text("nothing is proved here").wait_for()
     says.get_by_text("no plane is proved here").wait_for()
+
+
+def test_the_square_is_in_the_plane_that_the_proof_has_at_the_joint_positions(
+    page: Any, url: str, planar: Scene, planar_region: str, client: TestClient
+) -> None:
+    page.add_init_script(OBSERVE)
+    page.goto(f"{url}/regions/{planar_region}#pair=0")
+    page.get_by_text(READY).wait_for()
+    ends = client.get(f"/v1/regions/{planar_region}/configurations").json()["extremes"]
+    normals = []
+    for joint, end in (("arm/joint1", "lower"), ("arm/joint2", "upper")):
+        page.get_by_role("button", name=f"{joint} {'min' if end == 'lower' else 'max'}").click()
+        page.locator(".plane-said").get_by_text("the plane of cell").wait_for()
+        page.wait_for_timeout(200)
+        q = np.array(next(one[end] for one in ends if one["joint"] == joint))
+        asked = "&".join(f"q={value}" for value in q)
+        plane = client.get(f"/v1/regions/{planar_region}/pairs/0/plane?{asked}").json()
+        s = planar.to_s(q)
+        *a, b = np.array(plane["Z"]) @ [1.0, *s[plane["joints"]]]
+        ((visible, elements),) = page.evaluate(DRAWN)
+        X = np.array(elements).reshape(4, 4).T
+        assert visible
+        # Its corners and its middle, from the world into the frame of the plane.
+        corners = np.array([[x, y, 0.0, 1.0] for x in (-0.5, 0.5) for y in (-0.5, 0.5)] + [[0.0, 0.0, 0.0, 1.0]]) @ X.T
+        p = Kinematics.of(planar).points(plane["frame"], WORLD, corners[:, :3], s[None])[0]
+        assert np.abs(p @ a + b).max() / np.linalg.norm(a) < 1e-6
+        tip = (X @ [0.0, 0.0, 1.0, 0.0])[:3] / np.linalg.norm(X[:3, 2])
+        beyond = Kinematics.of(planar).points(plane["frame"], WORLD, corners[-1:, :3] + tip, s[None])[0]
+        assert (beyond @ a + b)[0] / np.linalg.norm(a) == pytest.approx(1.0), "it faces the first body"
+        normals.append(tip)
+    assert np.abs(normals[0] - normals[1]).max() > 1e-3, "it has moved"
+
+
+def test_the_cells_of_a_pair_of_a_job_lead_to_its_planes(page: Any, url: str, planar_region: str, client: TestClient) -> None:
+    job = client.get(f"/v1/regions/{planar_region}").json()["job"]
+    page.goto(f"{url}/jobs/{job}#pair=0")
+    page.get_by_role("link", name=f"region {planar_region[:8]}").click()
+    page.locator(".plane-said").get_by_text("the plane of cell").wait_for()
+    assert page.url == f"{url}/regions/{planar_region}#pair=0"
+    assert page.locator(".robot canvas").evaluate("one => one.getBoundingClientRect().top < innerHeight / 2"), "the robot is in view"
+
+
+def test_an_address_chooses_the_pair(page: Any, url: str, planar: Scene, planar_region: str) -> None:
+    for fragment, chosen in (("#pair=0", "0"), ("#pair=99", ""), ("#pair=", ""), ("", "")):
+        page.goto("about:blank")
+        page.goto(f"{url}/regions/{planar_region}{fragment}")
+        page.get_by_text(READY).wait_for()
+        assert page.get_by_label("Cells of the pair").input_value() == chosen
+    assert page.locator(".plane-said").count() == 0
 
 
 def test_the_page_is_saved_as_one_file_that_needs_no_service(

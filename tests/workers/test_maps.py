@@ -171,6 +171,17 @@ def test_pieces_on_several_processes_give_the_same_map(client: TestClient, arm: 
     helper = eventually(lambda: held(job_id, "piece"), "another process works on a piece")
     assert ended(job_id).outcome == "certified"
     assert helper.worker is not None
+    notes = [event.data for event in events_of(job_id) if event.kind == "note"]
+    looked = [note["cells"] for note in notes]
+    assert looked == sorted(looked)
+    assert looked[0] > 0
+    busy = {process for note in notes for process, seconds in note["work"].items() if seconds > 0}
+    assert helper.worker in busy
+    shown = client.get(f"/v1/jobs/{job_id}/timeline").json()
+    assert {shown["processes"][bar["process"]] for bar in shown["bars"] if bar["work"] == "piece"} == busy
+    rates = [rate["cells"] for rate in shown["rates"]]
+    assert min(rates) >= 0
+    assert max(rates) > 0
     assert proof_of(client, job_id) == local
     assert_nothing_is_left(job_id)
 

@@ -101,6 +101,7 @@ export function Pair({ store, version, robot, route }: Props) {
         <>
           <h3>Cells</h3>
           <p>{words(partition, iteration?.index)}</p>
+          <Planes store={store} pair={route.pair} iteration={iteration?.index} />
           <Cells
             partition={partition}
             joints={robot.model ? positions(robot.model) : []}
@@ -144,6 +145,21 @@ function Iterations({ store, pair, current }: { store: JobStore; pair: number; c
         );
       })}
     </nav>
+  );
+}
+
+/** Leads to the region of the iteration, or to the job's last one, whose page draws the pair's plane at each configuration. */
+function Planes({ store, pair, iteration }: { store: JobStore; pair: number; iteration: number | undefined }) {
+  const point = store.growth.find((one) => one.iteration === iteration) ?? store.growth.at(-1);
+  if (!point) return null;
+  return (
+    <p>
+      The page of{" "}
+      <a href={`/regions/${point.region}#pair=${pair}`}>
+        region <code>{point.region.slice(0, 8)}</code>
+      </a>
+      , of iteration {point.iteration}, draws the plane between the two at each configuration.
+    </p>
   );
 }
 

@@ -17,7 +17,8 @@ import { Upload } from "./upload";
 
 const ASK_AGAIN_MS = 1500;
 
-export function LibraryIsland({ scene }: { scene: string }) {
+/** `known`: how many regions the scene had when the page was made. */
+export function LibraryIsland({ scene, known }: { scene: string; known: number }) {
   const [model, setModel] = useState<SceneModel | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
   useEffect(() => {
@@ -25,10 +26,10 @@ export function LibraryIsland({ scene }: { scene: string }) {
   }, [scene]);
   if (problem) return <p class="notice bad">The scene cannot be drawn: {problem}</p>;
   if (!model) return <p class="empty">Loading the robot …</p>;
-  return <Library model={model} />;
+  return <Library model={model} known={known} />;
 }
 
-function Library({ model }: { model: SceneModel }) {
+function Library({ model, known }: { model: SceneModel; known: number }) {
   const names = useMemo(() => positions(model), [model]);
   const space: Space = useMemo(() => ({ joints: names, revolute: model.units.map((unit) => unit === "rad"), q_star: model.q_star, q_lower: model.q_lower, q_upper: model.q_upper }), [model]);
   const [q, setQ] = useState(model.q_star.map((value, i) => Math.min(Math.max(value, model.q_lower[i]!), model.q_upper[i]!)));
@@ -95,11 +96,11 @@ function Library({ model }: { model: SceneModel }) {
         <section aria-labelledby="h-graph">
           <h2 id="h-graph">Connected regions</h2>
           {graphProblem && <p class="notice bad">{graphProblem}</p>}
-          {!graph ? !graphProblem && <p class="empty">Comparing the regions …</p> : !some ? (
+          {!graph ? !graphProblem && <p class={known ? "empty graph" : "empty"}>Comparing the regions …</p> : !some ? (
             <p class="empty">This scene has no region yet. <a href={`/new?scene=${model.scene}`}>Start a job</a> that grows one.</p>
           ) : (
             <>
-              <p>
+              <p class="counts">
                 <strong>{graph.nodes.length}</strong> {graph.nodes.length === 1 ? "region" : "regions"}, {graph.edges.length} {graph.edges.length === 1 ? "overlap" : "overlaps"}, <strong>{graph.components}</strong> {graph.components === 1 ? "component" : "components"}{!graph.complete && ", so far"}.{" "}
                 {covered && <><span class="computed">They cover <strong>{(100 * covered.value).toFixed(0)} ± {Number((100 * covered.stderr).toPrecision(1))} %</strong> of the free configurations</span>, by a sample of {covered.free}.</>}
               </p>

@@ -30,6 +30,12 @@ const SAMPLES = 150;
 const GHOSTS = 40;
 const SECONDS_EACH = 0.9;
 
+/** The pair that the page's fragment names, as in #pair=3; null where it names none. */
+function named(pairs: RegionPair[]): number | null {
+  const name = new URLSearchParams(location.hash.slice(1)).get("pair");
+  return pairs.find(({ index }) => String(index) === name)?.index ?? null;
+}
+
 async function load(id: string): Promise<Loaded> {
   const [region, configurations, { pairs }] = await Promise.all([
     get<RegionDetail>(`/v1/regions/${id}`),
@@ -55,7 +61,8 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
   const faces: Faces = useMemo(() => ({ C, d }), [region]);
   const [q, setQ] = useState(configurations.seed ?? configurations.center);
   const [swept, setSwept] = useState(true);
-  const [pair, setPair] = useState<number | null>(null);
+  const section = useRef<HTMLElement>(null);
+  const [pair, setPair] = useState(() => named(pairs));
   const [cells, setCells] = useState<Partition | null>(null);
   const [cellsProblem, setCellsProblem] = useState<string | null>(null);
   const [playing, setPlaying] = usePlay(space, configurations.samples, q, setQ);
@@ -68,6 +75,9 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
   const kept = bodies < pairs.length ? ", and the conditions hold" : "";
   const proved = `The robot is inside the region: no collision of the ${bodies === 1 ? "covered pair" : `${bodies} covered pairs`}${kept}, as proved.`;
 
+  useLayoutEffect(() => {
+    if (pair !== null) section.current!.scrollIntoView();
+  }, []);
   useEffect(() => {
     setCells(null);
     setCellsProblem(null);
@@ -85,7 +95,7 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
   };
   const most = useMemo(() => [...pairs].sort((a, b) => b.cells - a.cells), [pairs]);
   return (
-    <section aria-labelledby="h-explore" class="explore">
+    <section aria-labelledby="h-explore" class="explore" ref={section}>
       <h2 id="h-explore">Look inside</h2>
       <InClaim place="now">
         <p role="status" class={inside ? "proved" : "inside not"}>{inside ? proved : "The robot is outside the region: nothing is proved here."}</p>
