@@ -13,6 +13,8 @@ from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Array, Scene
 from certifier.pair.collisions import in_collision
 from certifier.verify.decimals import at_least_mm
+from db.session import Database
+from tests.api.test_cells import grown, passing, stored
 from tests.dashboard.test_truth import until
 
 READY = "The robot is inside the region"
@@ -227,12 +229,13 @@ def test_the_square_is_in_the_plane_that_the_proof_has_at_the_joint_positions(
     assert np.abs(normals[0] - normals[1]).max() > 1e-3, "it has moved"
 
 
-def test_the_cells_of_a_pair_of_a_job_lead_to_its_planes(page: Any, url: str, planar_region: str, client: TestClient) -> None:
-    job = client.get(f"/v1/regions/{planar_region}").json()["job"]
-    page.goto(f"{url}/jobs/{job}#pair=0")
-    page.get_by_role("link", name=f"region {planar_region[:8]}").click()
+def test_the_cells_of_a_pair_of_a_job_lead_to_its_planes(page: Any, url: str, client: TestClient, worker: None, database: Database) -> None:
+    job = grown(client, stored(database, passing()), half_width=0.15)
+    page.goto(f"{url}/jobs/{job['id']}#pair=1")
+    page.get_by_role("link", name=f"region {job['region'][:8]}").click()
     page.locator(".plane-said").get_by_text("the plane of cell").wait_for()
-    assert page.url == f"{url}/regions/{planar_region}#pair=0"
+    assert page.url == f"{url}/regions/{job['region']}#pair=1"
+    assert page.get_by_label("Cells of the pair").input_value() == "1"
     assert page.locator(".robot canvas").evaluate("one => one.getBoundingClientRect().top < innerHeight / 2"), "the robot is in view"
 
 
