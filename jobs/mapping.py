@@ -149,7 +149,9 @@ def lead(claim: steps.Claim, scene: Scene) -> Done:
             led_s = time.monotonic() - begun
             if led_s > TURN * settings().time_limit_seconds or (led_s > slice_s and leading.gives_way()):
                 _led[claim.job_id] = led
+                leading.tell(account, last=True)
                 return Done({"ended": None})
+        leading.tell(account, last=True)
         return Done({"ended": reason, "reached": led.growing.coverage.share >= options.coverage})
     except NotLeading:  # the job has ended, or this process was believed dead: nothing that it reports is saved
         return Done({"ended": None})
@@ -240,10 +242,14 @@ class _Leading:
 
         return persistently(save)
 
-    def tell(self, account: Account) -> None:
-        """Keeps the account of the map, and says in the job's events how far it is, now and then."""
+    def tell(self, account: Account, last: bool = False) -> None:
+        """Keeps the account of the map, and says in the job's events how far it is, now and then.
+
+        Args:
+            last: this process leads no longer, so what others did until now is said at once.
+        """
         now = time.monotonic()
-        noted = now > self._told + NOTE_S
+        noted = now > self._told + NOTE_S or (last and len(self._work) > 0)
         note = {"text": account.said, "part": account.coverage, "cells": account.looked, "work": self._work}
         if noted:
             self._told, self._work = now, {}

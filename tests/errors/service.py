@@ -230,6 +230,7 @@ SERVICE: Table = {
     ("malformed_json", "body"): [lambda t: t.ask("POST", "/v1/jobs", content="{", headers={"Content-Type": "application/json"})],
     ("invalid_request", "Content-Type"): [lambda t: t.ask("POST", "/v1/jobs", content="{}", headers={"Content-Type": "text/plain"})],
     ("invalid_request", "scnee"): [lambda t: t.ask("GET", "/v1/jobs?scnee=slider")],
+    ("invalid_request", "until"): [lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/timeline?since=2&until=1")],
     ("invalid_request", "limit"): [lambda t: t.ask("GET", "/v1/jobs?limit=1&limit=2")],
     ("invalid_request", "zzz"): [lambda t: t.ask("GET", "/v1/jobs?zzz=1"), lambda t: t.ask("GET", "/v1/project?zzz=1")],
     ("invalid_request", "options.speed"): [lambda t: post(t, GROW | {"options": {"speed": 3}})],
