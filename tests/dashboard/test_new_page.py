@@ -453,6 +453,7 @@ def test_an_option_of_each_kind_gets_into_the_request(page: Any, url: str, plana
     monkeypatch.setattr(Grow, "forms", {"seed": ("Seed", Inner), "options": ("Ways", Outer)})
     page.goto(f"{url}/new?scene=planar&q=0.1,-0.2")
     page.get_by_text("No collision (computed").wait_for()
+    page.locator("figure.robot canvas").wait_for()  # it has a summary too, which comes late
     for summary in page.locator("summary").all():
         summary.click()
     ways = page.get_by_role("group", name="Ways")

@@ -13,7 +13,6 @@ TESTED = {
     "api/routers/results.py:_map_job": "tests/workers/test_maps.py",
     "api/routers/results.py:_stored_map": "tests/workers/test_maps.py",
     "api/routers/results.py:download_free_set": "tests/workers/test_maps.py",
-    "api/timeline.py:of_job": "tests/api/test_timeline.py",
     "api/writing.py:change": "tests/api/test_writers.py",
     "certifier/conditioned.py:_check_size": "tests/certifier/verify/test_condition_forgeries.py",
     "certifier/conditioned.py:_wrong": "tests/certifier/test_conditioned.py",
