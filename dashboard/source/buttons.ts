@@ -29,7 +29,6 @@ export function startButtons(): void {
     void makeKey(making);
   });
   for (const form of document.querySelectorAll<HTMLFormElement>("form[data-submit-on-change]")) {
-    form.querySelector("button")!.hidden = true;
     form.addEventListener("change", () => {
       // What is not chosen stays out of the address.
       const chosen = [...new FormData(form)].filter(([, value]) => value !== "").map(([name, value]) => [name, String(value)]);
