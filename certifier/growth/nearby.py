@@ -47,7 +47,7 @@ def nearby(scene: Scene, seed: dict[str, Any]) -> tuple[Polytope, Array] | None:
     bodies, seen, q, n = bodies_of(scene), seen_of(scene), scene.to_q(keep[0]), scene.n
     R, p, half = np.empty((len(bodies.parents), 3, 3)), np.empty((len(bodies.parents), 3)), np.inf
     for pair, view in enumerate(seen.moving):
-        each = moved(seen.views, view, seen.levers, np.ones(n))  # by so much a vertex moves at most, where all joints move by 1
+        each = moved(seen.views, view, seen.levers, np.ones(n))  # how far a vertex moves at most, where all joints move by 1
         if each > 0:
             half = min(half, PART * distance_at(bodies, seen, pair, q, R, p) / each)
     if not LEAST <= half < np.inf:

@@ -28,7 +28,7 @@ TARGETS, DRAWN = 64, 2000
 """A seed is chosen among TARGETS uncovered configurations, of DRAWN that are free; or of more, while fewer are found."""
 DRAWS = 10
 BUSY = 0.1
-"""What is seen from the seed of a region that grows counts so much for the next seed."""
+"""The weight, for the next seed, of what is seen from the seed of a region that still grows."""
 MOST = 3
 """Number of seeds that are chosen for uncovered configurations."""
 SPACING = 0.005

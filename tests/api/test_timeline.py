@@ -29,7 +29,7 @@ def result(outcome: Outcome = Outcome.CERTIFIED, seconds: float = 0.5) -> PairRe
 
 
 def begun(database: Database, job_id: str, seconds: float) -> None:
-    """Has the job, and its iteration, begin so long ago."""
+    """Sets when the job and its iteration began: this long before now."""
     with database.write() as session:
         job = jobs.lock(session, job_id)
         assert job.started_at is not None

@@ -55,7 +55,7 @@ def too_close(scene: Scene, leaves: int) -> PairResult:
 
 
 def left_open(scene: Scene, leaves: int) -> PairResult:
-    """A pair that is not certified, with so many cells, of which nobody knows a configuration."""
+    """A pair that is not certified, with this many cells. No configuration of them is known."""
     tree = cut_up(leaves)
     found: dict[str, Any] = {"open_cells": tree.open, "subtrees": b"", "outline": outline(scene, 0, tree).to_bytes()}
     return PairResult(Outcome.INCONCLUSIVE, None, seconds=2.0, **found)
@@ -91,7 +91,7 @@ def outline(scene: Scene, index: int, tree: Tree) -> Outline:
 
 
 def large_job(database: Database, scene: Scene, iterations: int, leaves: int) -> str:
-    """A running job whose last iteration has open pairs; the first pair of all has so many ``leaves`` there."""
+    """A running job whose last iteration has open pairs; the first pair of all has this many ``leaves`` there."""
     job_id = new_job(database, scene)
     states = [PairState.CERTIFIED] * 17 + [PairState.TOO_CLOSE, PairState.INCONCLUSIVE, PairState.REFUTED]
     with database.write() as session:

@@ -161,7 +161,7 @@ def test_long_work_of_others_takes_no_share(db: Database) -> None:
 
 
 def told(db: Database, processes: int) -> None:
-    """A worker says that it does so many pieces at the same time."""
+    """A worker reports how many pieces it does at the same time."""
     made = Made("host:1:1", WorkerKind.SOLVE, "1", processes, cores=processes, memory_bytes=1)
     with db.write() as session:
         workers.tell(session, made, WorkerState.RUNNING)

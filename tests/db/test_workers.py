@@ -125,7 +125,7 @@ def test_many_pairs_are_claimed_in_longer_batches(db: Database) -> None:
     with db.write() as session:
         a_running_job(session, pair_count=2000)
     forecast(db, 1.0)
-    assert busy(db) == 1000, "of 2 s each while so many are open"
+    assert busy(db) == 1000, "of 2 s each while that many are open"
 
 
 def test_a_job_waits_for_one_step(db: Database) -> None:

@@ -115,7 +115,7 @@ export function Timeline({ store, subject }: { store: JobStore; subject: string 
 
 function Tools({ told, range, setRange }: { told: Told; range: Range; setRange: (range: Range) => void }) {
   const wide = told.end - told.begin;
-  /** Shows so much of the time around a place that is this part of the width. */
+  /** Shows `width` seconds of the job around `middle`, which is in seconds since its start. */
   const show = (middle: number, width: number): void => {
     const until = Math.min(Math.max(middle + width / 2, width), told.seconds);
     setRange(width >= told.seconds ? null : { since: Math.max(until - width, 0), until });

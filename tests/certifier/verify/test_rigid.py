@@ -33,7 +33,7 @@ IDENTITY = [[fmpq(int(i == j)) for j in range(4)] for i in range(4)]
 
 
 def rough(scene, rng, size):
-    """The scene with numbers of frames and axes that are off by so much."""
+    """The scene with numbers of frames and axes that are off by this much."""
     joints = []
     for joint in scene.joints:
         frames = [X.copy() for X in (joint.X_PF, joint.X_BM)]
