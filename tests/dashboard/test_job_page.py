@@ -79,7 +79,7 @@ def test_the_page_finds_out_who_works_without_an_event(page: Any, url: str, data
     page.get_by_text("Queued: no worker.").wait_for()
     with database.write() as session:
         assert work.claim(session, job.id, lease_seconds=60, batch_seconds=0.5) is not None
-    page.get_by_text("looks for the starting region").wait_for()
+    page.get_by_text("Looking for a starting region around the seed").wait_for()
     page.locator(".title .badge", has_text="working").wait_for()
 
 

@@ -5,8 +5,11 @@ export function stepOf(kind: string, subject: string): string {
   return STEPS[kind]?.(subject) ?? kind;
 }
 
+const starting = (): string => "Looking for a starting region around the seed";
 const STEPS: Record<string, (subject: string) => string> = {
-  propose: () => "Looking for a starting region around the seed",
+  propose: starting,
+  seed: starting,
+  decide: () => "Deciding what comes next",
   step: () => "Moving the faces of the region",
   accept: (subject) => `Putting the proof of ${subject} together and verifying it`,
   scout: () => "Looking at what is covered",

@@ -2,21 +2,12 @@
 import type { HeldWork } from "../common/schema";
 import { plural } from "./outcomes";
 import { address } from "./route";
+import { stepOf } from "./steps";
 import type { JobStore } from "./store";
 
-const WORK: Record<string, string> = {
-  seed: "looks for the starting region",
-  map: "leads the work on the map",
-  piece: "proves cells of the map",
-  step: "moves the faces of the region",
-  scout: "looks at what is covered",
-  motion: "certifies a motion",
-  decide: "decides what comes next",
-};
 const NAMED = 4;
 
 export function Workers({ store, subject }: { store: JobStore; subject: string }) {
-  const work = (kind: string): string => (kind === "accept" ? `puts the proof of ${subject} together and verifies it` : (WORK[kind] ?? kind));
   return (
     <section aria-labelledby="h-workers">
       <h2 id="h-workers">Working on it</h2>
@@ -27,7 +18,7 @@ export function Workers({ store, subject }: { store: JobStore; subject: string }
           {store.workers.map((worker) => (
             <li key={worker.process + worker.pairs.join()}>
               <code title={worker.process}>{worker.process.split(":").slice(0, 2).join(":")}</code>{" "}
-              <span>{worker.work === "pairs" ? <Certifies store={store} worker={worker} /> : work(worker.work)}</span>
+              <span>{worker.work === "pairs" ? <Certifies store={store} worker={worker} /> : stepOf(worker.work, subject)}</span>
             </li>
           ))}
         </ul>
@@ -40,7 +31,7 @@ function Certifies({ store, worker }: { store: JobStore; worker: HeldWork }) {
   const more = worker.pairs.length - NAMED;
   return (
     <>
-      certifies {plural(worker.pairs.length, "pair")}:{" "}
+      Certifying {plural(worker.pairs.length, "pair")}:{" "}
       {worker.pairs.slice(0, NAMED).map((index, i) => {
         const pair = store.pairs[index];
         return (
