@@ -149,9 +149,9 @@ def lead(claim: steps.Claim, scene: Scene) -> Done:
             led_s = time.monotonic() - begun
             if led_s > TURN * settings().time_limit_seconds or (led_s > slice_s and leading.gives_way()):
                 _led[claim.job_id] = led
-                leading.tell(account, last=True)
+                leading.tell_rest(account)
                 return Done({"ended": None})
-        leading.tell(account, last=True)
+        leading.tell_rest(account)
         return Done({"ended": reason, "reached": led.growing.coverage.share >= options.coverage})
     except NotLeading:  # the job has ended, or this process was believed dead: nothing that it reports is saved
         return Done({"ended": None})
@@ -242,24 +242,22 @@ class _Leading:
 
         return persistently(save)
 
-    def tell(self, account: Account, last: bool = False) -> None:
-        """Keeps the account of the map, and says in the job's events how far it is, now and then.
+    def tell(self, account: Account) -> None:
+        """Keeps the account of the map, and says in the job's events how far it is, now and then."""
+        self.saving(lambda session, job: jobs.keep_growth(session, job, stored.document(account)))
+        if time.monotonic() > self._told + NOTE_S:
+            self._note(account)
 
-        Args:
-            last: this process leads no longer, so what others did until now is said at once.
-        """
-        now = time.monotonic()
-        noted = now > self._told + NOTE_S or (last and len(self._work) > 0)
-        note = {"text": account.said, "part": account.coverage, "cells": account.looked, "work": self._work}
-        if noted:
-            self._told, self._work = now, {}
+    def tell_rest(self, account: Account) -> None:
+        """Says what others did since the last note, for this process leads no longer."""
+        if self._work:
+            self._note(account)
 
-        def save(session: Any, job: JobRow) -> None:
-            jobs.keep_growth(session, job, stored.document(account))
-            if noted:
-                events.emit(session, job, events.NOTE, note)
-
-        self.saving(save)
+    def _note(self, account: Account) -> None:
+        self._told = time.monotonic()
+        work, self._work = self._work, {}
+        note = {"text": account.said, "part": account.coverage, "cells": account.looked, "work": work}
+        self.saving(lambda session, job: events.emit(session, job, events.NOTE, note))
 
     def gives_way(self) -> bool:
         """Says whether other jobs wait for a process, or this one is to end or to pause."""

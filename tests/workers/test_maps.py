@@ -64,9 +64,9 @@ def proof_of(client: TestClient, job_id: str) -> bytes:
     return answer.content
 
 
-def held(job_id: str, kind: str) -> StepRow | None:
+def held(job_id: str, kind: str, besides: str | None = None) -> StepRow | None:
     with database().read() as session:
-        mine = (StepRow.job_id == job_id, StepRow.kind == kind, StepRow.state == "running")
+        mine = (StepRow.job_id == job_id, StepRow.kind == kind, StepRow.state == "running", StepRow.worker != (besides or ""))
         return session.scalar(select(StepRow).where(*mine).order_by(StepRow.id.desc()).limit(1))
 
 
@@ -168,7 +168,8 @@ def test_questions_are_answered_by_the_latest_map(client: TestClient, planar: Sc
 
 def test_pieces_on_several_processes_give_the_same_map(client: TestClient, arm: tuple[Scene, np.ndarray], local: bytes) -> None:
     job_id = asked(client, arm[0], options={"coverage": COVERAGE})
-    helper = eventually(lambda: held(job_id, "piece"), "another process works on a piece")
+    leader = eventually(lambda: held(job_id, "map"), "a process leads the map").worker
+    helper = eventually(lambda: held(job_id, "piece", besides=leader), "another process works on a piece")
     assert ended(job_id).outcome == "certified"
     assert helper.worker is not None
     notes = [event.data for event in events_of(job_id) if event.kind == "note"]
