@@ -28,6 +28,9 @@ STEPS, ZERO = 40, 1e-10
 """Multipliers are given up after STEPS control points, or where the square of the distance of their rows' hull from 0 is below ZERO."""
 SLIGHT = 1e-6
 """f counts for nothing where its multiplier is less than this part of the largest one."""
+BITS = 14
+"""Multipliers are rounded to this many bits, so that a file deflates them better; with fewer, fewer pieces are proved (docs/trials.md)."""
+_SPLIT = 2.0 ** (53 - BITS) + 1.0
 
 
 @njit(cache=True)
@@ -207,7 +210,6 @@ def multipliers(
             return UNDECIDED
         for j in range(D):
             z[j] = max(x[j], 0.0) / scale[j]
-        # The multipliers are stored in single precision.
         largest = z[1]
         for j in range(1, m):
             largest = max(largest, z[1 + j])
@@ -215,8 +217,15 @@ def multipliers(
         unit = z[0] if positive else largest
         z[0] = 1.0 if positive else 0.0
         for j in range(m):
-            z[1 + j] = np.float32(z[1 + j] / unit)
+            z[1 + j] = rounded(z[1 + j] / unit)
     return UNDECIDED
+
+
+@njit(cache=True)
+def rounded(x: float) -> float:
+    """Returns a multiplier as a proof stores it: in single precision, with BITS bits (T. J. Dekker, 1971)."""
+    t = _SPLIT * x
+    return np.float32(t - (t - x))
 
 
 @njit(cache=True)

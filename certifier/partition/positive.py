@@ -18,7 +18,7 @@ from numba import njit
 
 from certifier.model import Array
 from certifier.partition.bernstein import alone, evaluate, extremes, halve, lowest, steepest
-from certifier.partition.multipliers import MORE, PROVED, REFUTED, SLIGHT, UNDECIDED, choose, multipliers, violated
+from certifier.partition.multipliers import MORE, PROVED, REFUTED, SLIGHT, UNDECIDED, choose, multipliers, rounded, violated
 from certifier.polytopes.simplex import dot
 from certifier.proof.limits import PIECE_DEPTH
 
@@ -366,7 +366,7 @@ def _hand_down(pieces: _Pieces, top: int, piece: _Piece, searched: int) -> None:
     pieces.z[top, 0] = 1.0
     if searched and near[0] > SLIGHT * near[: 1 + searched].max():
         for j in range(searched):
-            pieces.z[top, 1 + piece.chosen[j]] = np.float32(near[1 + j] / near[0])
+            pieces.z[top, 1 + piece.chosen[j]] = rounded(near[1 + j] / near[0])
     pieces.z[top + 1] = pieces.z[top]
 
 
