@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -66,6 +67,12 @@ def scene_name(client: Client, scene: str) -> str:
     """
     asked: str = known_scene(client, scene)["asked"] if is_scene_file(scene) else scene
     return asked
+
+
+def warn(client: Client, scene_id: str) -> None:
+    """Prints the warnings of a scene, as errors are printed."""
+    for warning in client.lint(scene_id)["warnings"]:
+        print("warning:", warning, file=sys.stderr)
 
 
 def grow(client: Client, request: Document, screen: Screen, watch: bool = False, idempotency_key: str | None = None) -> Grown:
