@@ -63,7 +63,7 @@ export function Chart({ curves, what }: { curves: Curve[]; what: string }) {
             )}
             {(part * GRID) % 2 === 0 && (
               <text x={x(part * end)} y={HEIGHT - 7} text-anchor={part === 0 ? "start" : part === 1 ? "end" : "middle"}>
-                {part === 0 ? "0 s" : duration(part * end)}
+                {duration(part * end)}
               </text>
             )}
           </g>
