@@ -33,15 +33,15 @@ def exclusions(scene: Scene) -> list[str]:
 
 
 def _together(scene: Scene, a: Condition, b: Condition) -> str | None:
-    match a, b:
-        case (Cone(), Cone()) if (a.body, a.of) == (b.body, b.of):
-            # Both angles between directions are at most so far apart where each direction is in its cone.
-            apart = abs(_angle(a.axis, b.axis) - _angle(a.along, b.along))
-            return f"both are about directions of '{a.body}', and their cones do not meet" if apart >= a.angle + b.angle else None
-        case (Range(), Range()) | (SlideRange(), SlideRange()) if dict(_signed(a)) == dict(_signed(b)):
-            return f"no value of {a.total} is in the ranges of both" if not _common(_kept(scene, a), _kept(scene, b)) else None
-        case (Inside() | InBall(), Inside() | InBall()) if a.of == b.of and (stays := _staying_in_both(a, b)):
-            return f"{stays} has to be in two zones that do not meet" if room_in((*_around(a), *_around(b))) <= 0 else None
+    """Returns why no configuration keeps both; None where that is not found."""
+    if isinstance(a, Cone) and isinstance(b, Cone) and (a.body, a.of) == (b.body, b.of):
+        # Both angles between directions are at most so far apart where each direction is in its cone.
+        apart = abs(_angle(a.axis, b.axis) - _angle(a.along, b.along))
+        return f"both are about directions of '{a.body}', and their cones do not meet" if apart >= a.angle + b.angle else None
+    if isinstance(a, Range | SlideRange) and isinstance(b, Range | SlideRange) and dict(_signed(a)) == dict(_signed(b)):
+        return None if _common(_kept(scene, a), _kept(scene, b)) else f"no value of {a.total} is in the ranges of both"
+    if isinstance(a, Inside | InBall) and isinstance(b, Inside | InBall) and a.of == b.of and (stays := _staying_in_both(a, b)):
+        return f"{stays} has to be in two zones that do not meet" if room_in((*_around(a), *_around(b))) <= 0 else None
     return None
 
 
