@@ -25,11 +25,12 @@ from workers import addresses
 
 @dataclass(frozen=True)
 class Checked:
-    """A request whose names and numbers fit its scene, and the options that the job will have."""
+    """A request whose names and numbers fit its scene, the options that the job will have, and warnings about it."""
 
     body: JobRequest
     scene_id: str
     options: dict[str, Any]
+    warnings: list[str]
 
 
 def checked(db: Database, body: JobRequest, where: str = "") -> Checked:
@@ -53,7 +54,7 @@ def checked(db: Database, body: JobRequest, where: str = "") -> Checked:
         if where:
             error.field = f"{where}.{error.field}" if error.field else where
         raise
-    return Checked(body, scene_id, options)
+    return Checked(body, scene_id, options, KINDS[body.kind].warnings(options, scene))
 
 
 def submit(session: Session, asked: Checked, caller: Caller, idempotency_key: str | None) -> tuple[JobRow, bool]:

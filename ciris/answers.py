@@ -569,6 +569,8 @@ class Cover:
     regions: tuple[str, ...]
     """Ids of the regions that it has grown."""
     coverage: FreeCoverage | None
+    curve: tuple[tuple[float, float, int], ...]
+    """For each look at the scene seconds since the start, the coverage by then, and how many regions the scene had."""
     components: tuple[int, ...] | None
     """How many regions each connected component of the scene has, the one that covers most first."""
     connected: bool | None

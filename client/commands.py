@@ -45,9 +45,7 @@ def in_database(args: Namespace) -> int:
 def scene_add(args: Namespace) -> int:
     with service.connect(args.url) as client:
         scene = client.add_scene(args.path)
-        warnings = client.lint(scene["id"])["warnings"]
-    for warning in warnings:
-        print("warning:", warning, file=sys.stderr)
+        service.warn(client, scene["id"])
     if args.json:
         print_json(scene)
     else:
@@ -61,6 +59,7 @@ def scene_constrain(args: Namespace) -> int:
     conditions = read_condition_file(Path(args.conditions))
     with service.connect(args.url) as client:
         scene = client.constrain_scene(service.scene_name(client, args.scene), conditions, args.name)
+        service.warn(client, scene["id"])
     if args.json:
         print_json(scene)
     else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -68,6 +69,12 @@ def scene_name(client: Client, scene: str) -> str:
     return asked
 
 
+def warn(client: Client, scene_id: str) -> None:
+    """Prints the warnings of a scene, as errors are printed."""
+    for warning in client.lint(scene_id)["warnings"]:
+        print("warning:", warning, file=sys.stderr)
+
+
 def grow(client: Client, request: Document, screen: Screen, watch: bool = False, idempotency_key: str | None = None) -> Grown:
     """Makes the service grow a region, and waits for it.
 
@@ -80,6 +87,7 @@ def grow(client: Client, request: Document, screen: Screen, watch: bool = False,
     while not new and job["ended"] and job["region"] is None:
         job = client.retry(job["id"])
     screen.line(f"job {job['id']}{', done in an earlier run' if job['ended'] else ''}: {client.url}/jobs/{job['id']}")
+    _tell_warnings(job, screen)
     if not job["ended"]:
         job = _wait(client, job["id"], screen, watch)
     if job["region"] is None:
@@ -90,10 +98,17 @@ def grow(client: Client, request: Document, screen: Screen, watch: bool = False,
 
 def grow_many(client: Client, requests: Sequence[Document], screen: Screen, watch: bool = False) -> list[Document]:
     """Makes the service grow regions, all at once, and waits for them. Returns the ended jobs, with a region or without."""
-    jobs = [client.create_job(request)[0]["id"] for request in requests]
+    jobs = [client.create_job(request)[0] for request in requests]
     for job in jobs:
-        screen.line(f"job {job}: {client.url}/jobs/{job}")
-    return [_wait(client, job, screen, watch) for job in jobs]
+        screen.line(f"job {job['id']}: {client.url}/jobs/{job['id']}")
+        _tell_warnings(job, screen)
+    return [_wait(client, job["id"], screen, watch) for job in jobs]
+
+
+def _tell_warnings(job: Document, screen: Screen) -> None:
+    """Tells what the service has warned of. A retry, and a service of an earlier version, have warned of nothing."""
+    for warning in job.get("warnings", ()):
+        screen.line(f"warning: {warning}")
 
 
 def run(client: Client, request: Document, screen: Screen) -> Document:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import Namespace
 from shlex import quote
 
@@ -15,9 +14,7 @@ OK = 0
 def scene_stage(args: Namespace) -> int:
     with service.connect(args.url) as client:
         scene = client.stage_scene(args.name, args.path)
-        warnings = client.lint(scene["id"])["warnings"]
-    for warning in warnings:
-        print("warning:", warning, file=sys.stderr)
+        service.warn(client, scene["id"])
     if args.json:
         print_json(scene)
         return OK

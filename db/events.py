@@ -61,6 +61,12 @@ def work(session: Session, job_id: str) -> Sequence[Row[str, dict[str, Any], dat
     return session.execute(select(EventRow.kind, EventRow.data, EventRow.created_at).where(*told).order_by(EventRow.seq)).all()
 
 
+def told(session: Session, job_id: str, kind: str) -> Sequence[Row[dict[str, Any], datetime]]:
+    """Returns data and time of the job's events of one kind, in order."""
+    of_kind = (EventRow.job_id == job_id, EventRow.kind == kind)
+    return session.execute(select(EventRow.data, EventRow.created_at).where(*of_kind).order_by(EventRow.seq)).all()
+
+
 def of_all(session: Session, after: int, limit: int, known: Collection[int] = ()) -> Sequence[EventRow]:
     """Returns the events of all jobs of the session's project whose ids are larger than a number, in the order of their ids.
 

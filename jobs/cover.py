@@ -39,6 +39,8 @@ from workers.app import send_coordinate, send_work
 
 ACTIVE = unfinished(JOB)
 NEVER = timedelta(days=10_000)
+COVERED = "cover"
+"""The kind of the events that say what a look at the scene has found."""
 
 
 class CoverRequestOptions(model_of(CoverOptions)):  # type: ignore[misc]
@@ -125,7 +127,7 @@ class Cover(Kind):
                     job.error = CirisError("not_covered", action.reason, field="options", hint=hint).to_document()
         known = said(state)
         if isinstance(turn.report, Scouted) and known is not None:
-            events.emit(session, job, "cover", known)
+            events.emit(session, job, COVERED, known)
         return isinstance(decision.action, Finish) or (isinstance(decision.action, Watch) and decision.action.stop)
 
     def do(self, claim: steps.Claim, scene: Scene) -> Done:
@@ -151,13 +153,19 @@ class Cover(Kind):
         return [Held(text) for text in self._said(session, job).get("obstacles", ())]
 
     def result(self, session: Session, job: JobRow) -> dict[str, Any]:
-        """Returns what the last look of a cover has seen, as :func:`planner.cover.result.said` says it, with its ``regions`` and jobs."""
+        """Returns what the last look of a cover has seen, as :func:`planner.cover.result.said` says it, with its ``regions`` and jobs.
+
+        Its ``curve`` is what its looks have seen: (seconds since its start, coverage, number of the scene's regions) of each.
+        """
         seen = dict.fromkeys(("coverage", "components", "largest", "connected", "connect", "seeds", "paths", "missing", "obstacles"))
         known = self._said(session, job)
+        start = job.started_at or job.created_at
+        looks = events.told(session, job.id, COVERED)
         grown = jobs.children(session, job.id)
         does = activity.of_jobs(session, grown)
         return {
             **{name: known.get(name) for name in seen},
+            "curve": [((at - start).total_seconds(), look["coverage"]["value"], look["regions"]) for look, at in looks],
             "regions": [region.id for region in regions.of_cover(session, job.id)],
             "grown": [
                 {

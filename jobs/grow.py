@@ -10,7 +10,7 @@ from certifier.growth.options import GrowthOptions
 from certifier.model import Scene
 from certifier.seeding.options import SeedOptions
 from db.session import Database
-from jobs.checks import check_length, check_positions
+from jobs.checks import blocked, check_length, check_positions
 from jobs.fields import model_of
 from jobs.growing import Growing
 from jobs.request import JobRequest
@@ -50,3 +50,9 @@ class Grow(Growing):
         if seed.q is not None:
             check_positions(scene, seed.q, "seed.q")
         return GrowthOptions.from_document({"kind": "grow", "seed": seed.to_document(), **body.options.model_dump()}).to_document()
+
+    def warnings(self, options: dict[str, Any], scene: Scene) -> list[str]:
+        q, contain = (options["seed"].get(name) for name in ("q", "contain"))
+        if q is None or not contain:
+            return []
+        return blocked(scene, {"seed.q": q, **{f"seed.contain[{i}]": point for i, point in enumerate(contain)}})

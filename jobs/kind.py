@@ -102,6 +102,10 @@ class Kind:
         """
         raise NotImplementedError
 
+    def warnings(self, options: dict[str, Any], scene: Scene) -> list[str]:
+        """Returns sentences about why a job with these options will probably be in vain, as far as that takes milliseconds."""
+        return []
+
     def decide(self, turn: Turn) -> Any:
         """Returns what is next. Nothing here reads or writes anything but the scene.
 

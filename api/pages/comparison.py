@@ -44,7 +44,7 @@ def compare_jobs_page(request: Request, a: str, b: str, db: Db) -> Response:
         "begun": begun,
         "differ": [(name, values) for name, values in known if values[0] != values[1]],
         "alike": sum(values[0] == values[1] for _, values in known),
-        "growth": [[point for point in jobs.get_job_growth(job.id, db).points if point.share is not None] for job in both],
+        "shown": [{"id": job.id, "kind": job.kind} for job in both],
     }
     return page(request, "compare_jobs.html", context)
 

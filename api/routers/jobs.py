@@ -23,6 +23,8 @@ from api.room import KeptRoom
 from api.schemas.common import MAX_INT, Cursor, JobGiven, OfIteration, OfScene, PairGiven, WithDependents
 from api.schemas.jobs import (
     MOST_TOGETHER,
+    AcceptedJob,
+    AcceptedJobs,
     CancelRequest,
     GrowthCurve,
     GrowthPoint,
@@ -93,7 +95,7 @@ def create_job(
     announcements: Announcements,
     room: KeptRoom,
     idempotency_key: IdempotencyKey = None,
-) -> Job:
+) -> AcceptedJob:
     """Starts a job that grows a region, certifies a polytope or a motion, certifies a region of a changed scene again, or covers a scene.
 
     A repetition of the request with the same Idempotency-Key returns the same job. Another request with that key is refused (409).
@@ -107,7 +109,7 @@ def create_job(
     else:
         response.status_code = status.HTTP_200_OK
     response.headers["Location"] = f"/v1/jobs/{job.id}"
-    return described(db, [job])[0]
+    return _accepted(described(db, [job]), [asked])[0]
 
 
 @router.post("/batch", status_code=status.HTTP_201_CREATED)
@@ -120,7 +122,7 @@ def create_jobs(
     announcements: Announcements,
     room: KeptRoom,
     idempotency_key: IdempotencyKey = None,
-) -> JobList:
+) -> AcceptedJobs:
     """Starts several jobs at once: all of them, or none where something is wrong with one, which the error's field names.
 
     A repetition of the request with the same Idempotency-Key returns the same jobs. Another batch with that key is refused (409). Keys of
@@ -133,7 +135,11 @@ def create_jobs(
     for job, new in made:
         if new:
             background.add_task(announcements.announce, job.id)
-    return JobList(jobs=described(db, [job for job, _ in made]))
+    return AcceptedJobs(jobs=_accepted(described(db, [job for job, _ in made]), asked))
+
+
+def _accepted(made: Sequence[Job], asked: Sequence[submission.Checked]) -> list[AcceptedJob]:
+    return [AcceptedJob(**dict(job), warnings=one.warnings) for job, one in zip(made, asked, strict=True)]
 
 
 @router.post("/cancel", dependencies=[SUBMIT], status_code=status.HTTP_202_ACCEPTED)

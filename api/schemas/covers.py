@@ -28,7 +28,7 @@ class CoverRegion(BaseModel):
 
 
 class Cover(BaseModel):
-    """Describes the results of a cover. All but ``regions`` are as of its last look at the scene, and null before the first."""
+    """Describes the results of a cover. What its last look at the scene has found is null before the first look."""
 
     state: JobState = Field(description="State of the job.")
     outcome: Outcome | None = Field(description="`certified` where all goals are reached; null before the job ends.")
@@ -37,6 +37,9 @@ class Cover(BaseModel):
     regions: list[str] = Field(description="Ids of the certified regions that the cover has grown.")
     grown: list[CoverRegion] = Field(description="The regions that it has begun.")
     coverage: Coverage | None = Field(description="How much is covered.")
+    curve: list[tuple[float, float, int]] = Field(
+        description="For each look at the scene seconds since the start, the covered part, and the number of the scene's regions."
+    )
     components: list[int] | None = Field(
         description="Number of regions of each connected component of the scene's regions, the component that covers most first."
     )

@@ -101,6 +101,21 @@ class Job(BaseModel):
         )
 
 
+class AcceptedJob(Job):
+    """Describes a job that was asked for now."""
+
+    warnings: list[str] = Field(
+        description="Why the job will probably be in vain, in sentences: what blocks the straight lines in s between configurations that a "
+        "region has to contain, at samples. None of it is proved, and an empty list says nothing."
+    )
+
+
+class AcceptedJobs(BaseModel):
+    """Holds jobs that were asked for now."""
+
+    jobs: list[AcceptedJob] = Field(description="The jobs, in the order of the requests.")
+
+
 class JobPage(Page):
     """Holds one page of jobs, newest first."""
 

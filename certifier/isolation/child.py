@@ -233,12 +233,12 @@ class _Nursery:
         self._log.close()
 
     def tail(self) -> str:
-        """Returns the last lines of the log as one line after a colon, without the frames of a traceback; empty for an empty log."""
+        """Returns the last lines of the log as one line after a colon, each once, without the frames of a traceback; empty without any."""
         if self._log.closed:
             return self._last_words
         self._log.seek(max(0, self._log.seek(0, os.SEEK_END) - _TAIL_BYTES))
         lines = self._log.read().decode(errors="replace").splitlines()
-        text = " ".join(line.strip() for line in lines if line.strip() and not line.startswith((" ", "Traceback")))
+        text = " ".join(dict.fromkeys(line.strip() for line in lines if line.strip() and not line.startswith((" ", "Traceback"))))
         return f": {text}" if text else ""
 
 

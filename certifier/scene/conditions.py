@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from certifier.conditions import NAMED, Condition, Cone, Distance, InBall, Inside, Range, SlideRange, is_condition_name
@@ -67,7 +67,7 @@ def read_conditions(value: Any) -> tuple[ConditionEntry, ...]:
 
 
 def constrained(scene: Scene, entries: Sequence[ConditionEntry], swept: Collection[str] = ()) -> Scene:
-    """Returns a scene with the conditions that it has, and with these.
+    """Returns a scene with the conditions that it has, and with these, and with a warning about those that nothing keeps.
 
     Args:
         swept: joints that are swept. Geometries behind them stand for all of their places, but frames are in the middle.
@@ -76,6 +76,7 @@ def constrained(scene: Scene, entries: Sequence[ConditionEntry], swept: Collecti
         SceneError: ``scene_field``; ``unknown_name``, for a body, a geometry or a joint that the scene does not have; ``condition``.
     """
     from certifier.conditioned import with_conditions, without_conditions
+    from certifier.scene.exclusions import exclusions
 
     base, own = without_conditions(scene), {one.name for one in scene.conditions}
     for i, entry in enumerate(entries):
@@ -83,10 +84,11 @@ def constrained(scene: Scene, entries: Sequence[ConditionEntry], swept: Collecti
             problem = f"{entry.name} is the name of a condition that the scene has"
             raise fields.wrong(f"conditions[{i}].name", problem, hint="give each its own name")
     try:
-        return with_conditions(base, [*scene.conditions, *(condition(entry, base, swept) for entry in entries)])
+        made = with_conditions(base, [*scene.conditions, *(condition(entry, base, swept) for entry in entries)])
     except SceneError as error:
         error.field = {f"conditions.{entry.name}": entry.field for entry in entries}.get(error.field or "", error.field)
         raise
+    return replace(made, warnings=tuple(dict.fromkeys([*scene.warnings, *exclusions(made)])))
 
 
 def swept_in(scene: Scene) -> Collection[str]:
@@ -216,11 +218,9 @@ def _zone(said: Mapping[str, Any], where: str) -> tuple[tuple[float, float, floa
 
 def _check_room(zone: Sequence[tuple[float, float, float, float]], where: str) -> None:
     """Refuses faces between which nothing is."""
-    from scipy.optimize import linprog
+    from certifier.scene.exclusions import room_in
 
-    normals, offsets = [[*face[:3], 1.0] for face in zone], [face[3] for face in zone]
-    found = linprog([0, 0, 0, -1], normals, offsets, bounds=[(None, None)] * 3 + [(None, 1.0)])  # the largest ball, of at most a metre
-    if found.status == 0 and found.x[3] <= 0:
+    if room_in(zone) <= 0:
         raise fields.wrong(f"{where}.half_spaces", "leave no room between them", hint="each says a x + b y + c z <= d")
 
 

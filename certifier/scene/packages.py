@@ -11,11 +11,10 @@ from xml.parsers import expat
 from certifier.errors import SceneError
 from certifier.scene.macros import Expander, in_xacro, packages_named
 from certifier.scene.paths import beside
-from certifier.scene.references import references
+from certifier.scene.references import MANIFEST, references
 from certifier.scene.xml import parse_xml
 
 _SCHEMES = ("package://", "model://")
-_MANIFEST = "package.xml"
 _WORKSPACE = ("*", "src/*", "src/*/*")
 """Below a directory above the model, packages of a ROS workspace have their manifests here."""
 _INSTALLED = ("install/*/share", "install/share", "share")
@@ -49,14 +48,15 @@ def packages_of(
         found = packages_named(model, lambda name: next((place.absolute() for place in at(name) if place.is_dir()), None))
         file = beside(Path.cwd(), str(model))
         if not any(file.is_relative_to(root) for root in (directory, *found.values())):
-            own = next((above for above in file.parents if (above / _MANIFEST).is_file()), file.parent)
+            own = next((above for above in file.parents if (above / MANIFEST).is_file()), file.parent)
             found[_named(own) or own.name] = own
         expanded = Expander(directory, found, arguments).expanded(file, model.name)
     written = [reference.partition("://")[2] for reference in references(model, expanded) if reference.startswith(_SCHEMES)]
     for name in dict.fromkeys(reference.partition("/")[0] for reference in written):
         places = at(name)
         if not places or not places[0].is_dir():
-            looked = "above it, in a workspace around it, in AMENT_PREFIX_PATH or in ROS_PACKAGE_PATH"
+            variables = ", in AMENT_PREFIX_PATH or in ROS_PACKAGE_PATH" if environment else ""
+            looked = f"above it{',' if environment else ' or'} in a workspace around it{variables}"
             message = f"{model.name} names the package {name}, which is not {'there' if name in given else looked}"
             rest = [path.partition("/")[2] for path in written if path.startswith(f"{name}/")]
             like = next((above for above in model.absolute().parents for path in rest if path and (above / path).is_file()), None)
@@ -84,7 +84,7 @@ def _all_places(name: str, model: Path, environment: Mapping[str, str]) -> Itera
             yield above
         if (above / name).is_dir():
             yield above / name
-        manifests = (manifest for pattern in _WORKSPACE for manifest in sorted(above.glob(f"{pattern}/{_MANIFEST}")))
+        manifests = (manifest for pattern in _WORKSPACE for manifest in sorted(above.glob(f"{pattern}/{MANIFEST}")))
         yield from (manifest.parent for manifest in manifests if _named(manifest.parent) == name)
         yield from (place for pattern in _INSTALLED for place in sorted(above.glob(f"{pattern}/{escape(name)}")) if place.is_dir())
     for prefix in _listed(environment, "AMENT_PREFIX_PATH"):
@@ -103,7 +103,7 @@ def _named(directory: Path) -> str | None:
 
     Most manifests that are looked at are of other packages. So what is wrong with one is nothing that the draft is about.
     """
-    manifest = directory / _MANIFEST
+    manifest = directory / MANIFEST
     open_elements: list[str] = []
     text: list[str] = []
 

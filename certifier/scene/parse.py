@@ -153,7 +153,7 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     files = {entry.reason: one.file for one in semantics for entry in one.ignore}
     named = replace(scene, configurations=states | own_configurations(scene, scene_file.configurations))
     document = constrained(named, scene_file.conditions, sweeps).to_document()
-    document["warnings"] = (
+    document["warnings"] += (
         warnings
         + said_of(sweeps)
         + [f"joint {name} has the multiplier 0 (mimic), so it never moves: it is held at {at[name]:.9g}" for name in _at_rest(coupled)]

@@ -26,6 +26,9 @@ _PLUGIN = "plugin"
 _GAZEBO = "gazebo"
 """Drake reads nothing in this element of URDF."""
 _MJCF = (".xml", ".mjcf")
+_XACRO = ".xacro"
+MANIFEST = "package.xml"
+"""The file of a package of ROS that has its name."""
 _DIRECTORIES = {"meshdir", "texturedir", "assetdir"}
 _EXPORT = "export the mesh again"
 _SCHEME = re.compile(r"^([a-zA-Z][\w+.-]*):(//)?")
@@ -76,6 +79,11 @@ def resolve(reference: str, directory: Path, packages: dict[str, Path]) -> Path:
     return beside(packages[name], rest.lstrip("/"))
 
 
+def is_read(path: Path) -> bool:
+    """Says whether a file is of a kind that Drake reads, by its name. It reads no xacro, and no manifest of a package."""
+    return path.suffix.lower() in _READERS and path.suffix.lower() != _XACRO and path.name != MANIFEST
+
+
 def is_mjcf(path: Path) -> bool:
     """Says whether Drake takes a file for MJCF, by its name."""
     return path.suffix.lower() in _MJCF
@@ -112,7 +120,7 @@ def _written(path: Path, data: bytes) -> tuple[list[str], list[str]]:
     text: list[str] = []
 
     def unread() -> bool:
-        return _GAZEBO in stack and path.suffix.lower() in (".urdf", ".xacro")
+        return _GAZEBO in stack and path.suffix.lower() in (".urdf", _XACRO)
 
     def start(name: str, attributes: dict[str, str]) -> None:
         stack.append(name)
@@ -173,7 +181,7 @@ def _nothing(_: Path) -> list[str]:
 
 
 _READERS: dict[str, Callable[[Path], list[str]]] = {
-    **dict.fromkeys((".urdf", ".sdf", ".xacro", *_MJCF), _xml),
+    **dict.fromkeys((".urdf", ".sdf", _XACRO, *_MJCF), _xml),
     **dict.fromkeys((".yaml", ".yml"), _yaml),
     ".obj": _obj,
     ".gltf": _gltf,

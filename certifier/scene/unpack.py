@@ -8,13 +8,14 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from certifier.errors import SceneError
+from certifier.names import escaped
 from certifier.scene.bundle import INDEX, SMALLER, BundleLimits
 from certifier.scene.draft import draft
 from certifier.scene.file import read_scene_file
 from certifier.scene.macros import in_xacro
 from certifier.scene.packages import packages_of
 from certifier.scene.parse import parse
-from certifier.scene.references import is_mjcf, references, resolve
+from certifier.scene.references import is_mjcf, is_read, references, resolve
 
 _DEPTH = 32
 _BELOW = "keep the file below the directory of the model"
@@ -24,6 +25,8 @@ _LITTER = {"__MACOSX", ".DS_Store"}
 """A Mac puts these into every zip. They are left out."""
 SCENE_FILE = "scene.yaml"
 """A zip without an index has its scene in this file."""
+_NAMED = 3
+"""So many files are named where there are several."""
 MODELS = (".urdf", ".sdf", ".mjcf")
 """A zip without a scene file is taken for the robot whose model it has."""
 
@@ -47,7 +50,12 @@ def _drafted(root: Path, model: Path) -> Path:
     Drake sees the model once it has passed with a scene file that has nothing but the model.
     """
     scene = root / f"{model.stem}.yaml"
-    packages = packages_of(model, {}, {}, {}, root)[0]
+    try:
+        packages = packages_of(model, {}, {}, {}, root)[0]
+    except SceneError as error:
+        if error.code == "scene_package":
+            error.hint = "put each package into the zip, as a folder of its name with all files that the model takes from it"
+        raise
     directive = {"add_model": {"name": "model", "file": model.relative_to(root).as_posix()}}
     besides = {"packages": {name: path.relative_to(root).as_posix() for name, path in packages.items() if path.is_relative_to(root)}}
     scene.write_text(json.dumps({"name": "draft", "directives": [directive], **(besides if packages else {})}), encoding="utf-8")
@@ -59,6 +67,8 @@ def _drafted(root: Path, model: Path) -> Path:
 def check_bundle(root: Path, scene: Path) -> None:
     """Checks every file of an unpacked bundle before Drake sees it: known kinds, no entities, no reference out of ``root``.
 
+    A zip of a robot's package has more in it, such as its licence and xacro. What Drake would not read and no file refers to is deleted.
+
     Raises:
         SceneError: as :func:`certifier.scene.bundle.load_bundle` says.
     """
@@ -68,15 +78,34 @@ def check_bundle(root: Path, scene: Path) -> None:
         _inside(directory, root, f"packages.{name}")
     for model, srdf in scene_file.srdf.items():
         _inside(resolve(srdf, scene.parent, packages), root, f"srdf.{model}")
-    for file in sorted(f for f in root.rglob("*") if f.is_file() and f.name != INDEX):
-        where = file.relative_to(root).as_posix()
-        if in_xacro(file, where):
-            message = f"{where} is written in xacro, and a bundle has its expansion"
-            raise SceneError("bundle_file", message, hint="make the bundle with `ciris scene add`, which expands it")
-        for reference in references(file):
-            if is_mjcf(file) and ".." in PurePosixPath(reference).parts:
-                raise SceneError("bundle_uri", f"{where}: {reference!r}: .. is not accepted here", hint=_BELOW)
-            _inside(resolve(reference, file.parent, packages), root, f"{where}: {reference!r}")
+    files = sorted(file for file in root.rglob("*") if file.is_file() and file.name != INDEX)
+    others = {file.resolve(): file for file in files if file != scene and not is_read(file)}
+    waiting = [file for file in files if file.resolve() not in others]
+    while waiting:
+        file = waiting.pop(0)
+        waiting += [others.pop(target) for target in _needed(file, root, packages) if target in others]
+    for file in others.values():
+        file.unlink()
+
+
+def _needed(file: Path, root: Path, packages: dict[str, Path]) -> list[Path]:
+    """Checks a file, and returns the paths that it refers to.
+
+    Raises:
+        SceneError: as :func:`check_bundle`.
+    """
+    where = file.relative_to(root).as_posix()
+    if in_xacro(file, where):
+        message = f"{where} is written in xacro, and a bundle has its expansion"
+        raise SceneError("bundle_file", message, hint="make the bundle with `ciris scene add`, which expands it")
+    found = []
+    for reference in references(file):
+        if is_mjcf(file) and ".." in PurePosixPath(reference).parts:
+            raise SceneError("bundle_uri", f"{where}: {reference!r}: .. is not accepted here", hint=_BELOW)
+        target = resolve(reference, file.parent, packages)
+        _inside(target, root, f"{where}: {reference!r}")
+        found.append(target.resolve())
+    return list(dict.fromkeys(found))
 
 
 def _inside(path: Path, root: Path, what: str) -> None:
@@ -115,9 +144,17 @@ def _only_scene(root: Path) -> str:
     found = list(root.rglob(SCENE_FILE)) or list(root.rglob("*.yaml"))
     if not found:
         found = next((some for kind in MODELS if (some := list(root.rglob(f"*{kind}")))), [])
-    if len(found) != 1:
-        message = f"the zip has no {INDEX}, and {len(found) or 'no'} files that may be the scene file or the robot's model"
-        raise SceneError("bundle_zip", message, field="bundle", hint=f"zip a directory with one {SCENE_FILE}, or use `ciris scene add`")
+    if not found:
+        hint = f"add a {SCENE_FILE}, or a robot's model: {', '.join(MODELS)}"
+        if any(root.rglob("*.xacro")):
+            hint = "expand the xacro to a .urdf, or use `ciris scene init` and `ciris scene add`, which expand it"
+        raise SceneError("bundle_zip", "the zip has no scene file, and no model of a robot", field="bundle", hint=hint)
+    if len(found) > 1:
+        names = sorted(escaped(file.name)[:60] for file in found)
+        more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+        message = f"the zip has {len(names)} files that may be the scene file or the robot's model: {', '.join(names[:_NAMED])}{more}"
+        hint = f"leave one of them in it, or add a {SCENE_FILE} that says which models belong to the scene"
+        raise SceneError("bundle_zip", message, field="bundle", hint=hint)
     return found[0].relative_to(root).as_posix()
 
 

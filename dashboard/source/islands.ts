@@ -2,6 +2,8 @@
 import type { ComponentType } from "preact";
 
 const ISLANDS: Record<string, () => Promise<ComponentType<any>>> = {
+  "compare-jobs": async () => (await import("./compare/jobs")).CompareJobsIsland,
+  "compare-regions": async () => (await import("./compare/regions")).CompareRegionsIsland,
   job: async () => (await import("./job/job")).JobIsland,
   library: async () => (await import("./library/library")).LibraryIsland,
   new: async () => (await import("./new/new")).NewIsland,

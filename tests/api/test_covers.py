@@ -87,7 +87,7 @@ def test_the_jobs_of_its_regions_are_listed_apart_and_name_it(client: TestClient
 def test_what_it_has_come_to_is_told(client: TestClient, scene: Scene, database: Database) -> None:
     cover = asked(client, connect=[[0.0], [-0.2]])
     before = client.get(f"/v1/jobs/{cover['id']}/cover").json()
-    assert (before["coverage"], before["regions"], before["grown"], before["missing"]) == (None, [], [], None)
+    assert (before["coverage"], before["regions"], before["grown"], before["missing"], before["curve"]) == (None, [], [], None, [])
     child = with_child(database, cover["id"])
     seen = Scouted(version=3, regions=3, samples=100, covered=40, components=(2, 1), largest=30, connect=(0, 1), obstacles=("no way",))
     with database.write() as session:

@@ -195,7 +195,9 @@ def test_files_nested_for_ever(client: TestClient, file: str, content: str, code
 
 
 def test_programs_and_other_files_have_no_place(client: TestClient) -> None:
-    refused(client, zipped(**{"run.sh": "#!/bin/sh\ntrue\n"}), 422, "bundle_file", "run.sh")
+    """A robot's package may have them. A model may not refer to them."""
+    mesh = "<robot name='a'><link name='l'><collision><geometry><mesh filename='run.sh'/></geometry></collision></link></robot>"
+    refused(client, zipped(**{"arm.urdf": mesh, "run.sh": "#!/bin/sh\ntrue\n"}), 422, "bundle_file", "run.sh")
 
 
 EXAMPLE = pack_bundle(Path(__file__).parents[2] / "examples" / "planar_2dof" / "scene.yaml")

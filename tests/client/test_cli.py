@@ -387,6 +387,10 @@ def test_a_scene_of_the_service_gets_conditions(ciris: Ciris, url: str, scene: S
     assert first.endswith("  low-slider")
     assert statement.startswith("condition 'low': 'model/")
     assert ciris("scene", "show", "low-slider", "--json", CIRIS_URL=url).json["conditions"][0]["name"] == "low"
+    (tmp_path / "high.yaml").write_text("conditions:\n  - name: high\n    inside: {what: [model/cart], half_spaces: [[0, 0, -1, -0.6]]}\n")
+    both = ciris("scene", "constrain", "low-slider", "high.yaml", "--name", "no-slider", CIRIS_URL=url)
+    assert both.stderr.splitlines()[-1].startswith("warning: the conditions 'low' and 'high' exclude each other")
+    assert ciris("scene", "show", "no-slider", "--json", CIRIS_URL=url).json["warnings"] > 0
     (tmp_path / "none.yaml").write_text("name: low\n")
     wrong = ciris("scene", "constrain", "slider", "none.yaml", "--name", "x", CIRIS_URL=url)
     assert (wrong.status, wrong.error.startswith("none.yaml: name: is not a key of a scene file")) == (2, True)

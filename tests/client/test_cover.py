@@ -11,7 +11,7 @@ import pytest
 from certifier.model import Scene
 from client.follow import Teller
 from client.output import Screen
-from db import jobs
+from db import jobs, scenes
 from db.session import Database
 from planner.cover.options import CoverOptions
 from tests.client.conftest import Ciris
@@ -33,10 +33,8 @@ def test_what_makes_no_sense_is_bad_input(ciris: Ciris, url: str, scene: Scene, 
     assert done.error.startswith(error)
 
 
-def test_its_options_become_those_of_the_job(ciris: Ciris, url: str, scene: Scene, database: Database, tmp_path: Path) -> None:
-    """Nobody works on the job, so it is cancelled by the time the command looks at it."""
-    (tmp_path / "path.csv").write_text("0\n0.1\n")
-    given = ["--connect", "0", "--connect", "-0.2", "--seed", "-0.1", "--path", str(tmp_path / "path.csv"), "--coverage", "0.8"]
+def cancelling(database: Database) -> threading.Thread:
+    """Returns a thread that runs until there is a job, and cancels it."""
 
     def end() -> None:
         made: list[str] = []
@@ -47,6 +45,24 @@ def test_its_options_become_those_of_the_job(ciris: Ciris, url: str, scene: Scen
 
     ending = threading.Thread(target=end, daemon=True)
     ending.start()
+    return ending
+
+
+def test_what_will_probably_end_a_job_is_printed(ciris: Ciris, url: str, database: Database, planar: Scene) -> None:
+    with database.write() as session:
+        scene = scenes.add(session, planar).id
+    ending = cancelling(database)
+    done = ciris("grow", scene, "--q", "0,0", "--contain", "0.75,1.5", CIRIS_URL=url)
+    ending.join()
+    assert "warning: a region cannot hold the straight line in s from seed.q to seed.contain[0]" in done.stderr
+
+
+def test_its_options_become_those_of_the_job(ciris: Ciris, url: str, scene: Scene, database: Database, tmp_path: Path) -> None:
+    """Nobody works on the job, so it is cancelled by the time the command looks at it."""
+    (tmp_path / "path.csv").write_text("0\n0.1\n")
+    given = ["--connect", "0", "--connect", "-0.2", "--seed", "-0.1", "--path", str(tmp_path / "path.csv"), "--coverage", "0.8"]
+
+    ending = cancelling(database)
     done = ciris("cover", "slider", *given, "--connected", "--at-once", "3", "--stages", "2", CIRIS_URL=url)
     ending.join()
     assert done.status == 2

@@ -25,6 +25,8 @@ ROOT = Path(__file__).parents[2]
 PICTURES = ROOT / "docs" / "pictures"
 WIDE, PHONE = {"width": 1280, "height": 860}, {"width": 390, "height": 844}
 COLOURS = 128
+PATIENCE_MS, SECONDS = 240_000, 300
+"""For a page, and for a region that has a share of its starting region."""
 Prepare = Callable[[Page], object]
 
 
@@ -35,10 +37,12 @@ def main() -> None:
         asked = ciris.connect(service.url)
         planar, arm, bin_ = (asked.add_scene(ROOT / "examples" / name / "scene.yaml") for name in ("planar_2dof", "arm_3dof", "ur3e_bin"))
         asked.cover(planar, coverage=0.8, deadline=500)
-        done = asked.submit_grow(arm, seed("arm_3dof"), deadline=400)
-        region = done.result()
-        growing = asked.submit_grow(bin_, seed("ur3e_bin"), deadline=400)
-        views(browser, service.url, {"planar": planar.id, "job": growing.id, "pair": done.id, "region": region.id})
+        done, other = (asked.submit_grow(arm, seed("arm_3dof"), deadline=200, **options) for options in ({}, {"cells": 20, "stages": 1}))
+        regions = [job.result().id for job in (done, other)]
+        ids = {"planar": planar.id, "pair": done.id, "other": other.id, "region": regions[0], "smaller": regions[1]}
+        views(browser, service.url, ids)
+        growing = asked.submit_grow(bin_, seed("ur3e_bin"), deadline=600)
+        growing_views(browser, service.url, growing.id)
         growing.cancel().wait()
         browser.close()
 
@@ -49,23 +53,41 @@ def seed(example: str) -> Any:
 
 
 def views(browser: Browser, url: str, ids: dict[str, str]) -> None:
-    """Takes the pictures."""
+    """Takes the pictures of what has ended."""
     planned = f"/scenes/{ids['planar']}"
     shoot(browser, f"{url}/new?scene={ids['planar']}&q=0.3,-0.6", "dashboard_new", ".said >> text=/computed|certified/")
     shoot(browser, f"{url}{planned}", "dashboard_scene", "text=/component/", planning)
     shoot(browser, f"{url}{planned}", "dashboard_scene_dark", "text=/component/", planning, scheme="dark")
     shoot(browser, f"{url}/regions/{ids['region']}", "dashboard_region", "text=of this slice is certified")
     shoot(browser, f"{url}/regions/{ids['region']}", "dashboard_region_phone", "text=of this slice is certified", size=PHONE)
+    shoot(browser, f"{url}/regions/{ids['region']}", "dashboard_plane", "text=of this slice is certified", plane, part=".explore .views")
+    shoot(
+        browser,
+        f"{url}/compare?a={ids['region']}&b={ids['smaller']}",
+        "dashboard_compare",
+        "text=of this slice is certified",
+        part=".slice",
+    )
+    both = f"{url}/compare/jobs?a={ids['pair']}&b={ids['other']}"
+    shoot(browser, both, "dashboard_compare_jobs", "figure.share", part="[data-island=compare-jobs] section")
     shoot(browser, f"{url}/jobs/{ids['pair']}", "dashboard_pair", "role=grid", pair)
-    while "certified" not in browser_text(browser, f"{url}/jobs/{ids['job']}"):
-        time.sleep(2)
-    shoot(browser, f"{url}/jobs/{ids['job']}", "dashboard_job", "role=grid")
+    shoot(browser, f"{url}/jobs/{ids['pair']}", "dashboard_timeline", "role=grid", part="section[aria-labelledby=h-timeline]")
+
+
+def growing_views(browser: Browser, url: str, job: str) -> None:
+    """Takes the pictures of a job that runs, once it has certified a region of its starting region, or after some minutes."""
+    until = time.monotonic() + SECONDS
+    while time.monotonic() < until and "Shares are estimated" not in browser_text(browser, f"{url}/jobs/{job}"):
+        time.sleep(5)
+    shoot(browser, f"{url}/jobs/{job}", "dashboard_job", "role=grid")
+    shoot(browser, f"{url}/jobs/{job}", "dashboard_job_phone", "role=grid", size=PHONE)
     shoot(browser, url, "dashboard_jobs", "tbody tr")
 
 
 def browser_text(browser: Browser, address: str) -> str:
     """What a page says."""
     page = browser.new_page()
+    page.set_default_timeout(PATIENCE_MS)
     page.goto(address)
     page.locator("role=grid").or_(page.locator(".empty")).first.wait_for()
     text = page.locator("main").text_content() or ""
@@ -90,6 +112,11 @@ def pair(page: Page) -> None:
     page.get_by_text("Cells", exact=True).first.wait_for()
 
 
+def plane(page: Page) -> None:
+    """Has the plane drawn between the bodies of the pair that has the most cells."""
+    page.get_by_label("Cells of the pair").select_option(index=1)
+
+
 def shoot(
     browser: Browser,
     address: str,
@@ -99,20 +126,29 @@ def shoot(
     *,
     size: dict[str, int] = WIDE,
     scheme: str = "light",
+    part: str | None = None,
 ) -> None:
-    """Takes a picture of a page, and says how long it took until something was to be seen, and until ``there`` was."""
+    """Takes a picture of a page, or of a part of it, and says how long it took until something was to be seen, and until ``there`` was."""
     context = browser.new_context(viewport=size, color_scheme=scheme, device_scale_factor=1)  # type: ignore[arg-type]
     page = context.new_page()
+    page.set_default_timeout(PATIENCE_MS)
     began = time.perf_counter()
     page.goto(address, wait_until="commit")
-    page.locator(there).first.wait_for(timeout=60_000)
+    page.locator(there).first.wait_for()
     drawn = time.perf_counter() - began
     first = page.evaluate("performance.getEntriesByName('first-contentful-paint')[0]?.startTime ?? NaN") / 1000
     print(f"{name}: first view {first:.2f} s, {there!r} after {drawn:.2f} s", flush=True)
     prepare(page)
     page.wait_for_timeout(2500)
     file = PICTURES / f"{name}.png"
-    page.screenshot(path=file, full_page=size is WIDE)
+    if part is None:
+        page.evaluate("scrollTo(0, 0)")
+        page.wait_for_timeout(1000)
+        page.screenshot(path=file, full_page=size is WIDE)
+    else:
+        page.locator(part).first.scroll_into_view_if_needed()
+        page.wait_for_timeout(1000)
+        page.locator(part).first.screenshot(path=file)
     picture = Image.open(file).convert("RGB")
     picture.crop((0, 0, picture.width, min(picture.height, 1600))).quantize(COLOURS, dither=Image.Dither.NONE).save(file, optimize=True)
     print(f"{file.relative_to(ROOT)}: {file.stat().st_size // 1024} KiB, mean {np.asarray(picture).mean():.0f}", flush=True)

@@ -11,7 +11,7 @@ from fastapi.testclient import TestClient
 from certifier.jobs.region import Region
 from certifier.verify.decimals import at_least_mm
 from db.session import Database
-from tests.api.conftest import store_region
+from tests.api.conftest import cut_corner, store_region
 
 
 @pytest.fixture
@@ -33,6 +33,36 @@ def test_regions_are_compared_from_the_page_of_one(page: Any, url: str, client: 
         row = page.get_by_role("region", name="Pairs").get_by_role("row").filter(has_text=pair["b"].rpartition("/")[2])
         assert row.locator("td.number").all_text_contents() == 2 * [at_least_mm(pair["margin"])]
     assert barriers(page) == []
+
+
+def test_slices_of_both_are_along_the_same_joints(page: Any, url: str, database: Database, planar_region: str, barriers: Any) -> None:
+    """Whoever chooses joints, or moves the point in one slice, does so in both."""
+    other = store_region(database, cut_corner())
+    asked: list[dict[str, Any]] = []
+    page.on("request", lambda request: asked.append(request.post_data_json) if request.url.endswith("/planning/slice") else None)
+    page.goto(f"{url}/compare?a={planar_region}&b={other}")
+    slices = page.get_by_role("region", name="Slices", exact=True)
+    drawn = [page.get_by_role("region", name=f"Slice of {region[:8]}") for region in (planar_region, other)]
+    for one in drawn:
+        one.get_by_text("1 region is in it").wait_for()
+    assert [body["regions"] for body in asked] == [[planar_region], [other]]
+    across, up = (body[name] for body in asked[:1] for name in ("x", "y"))
+    slices.locator("select").first.select_option(label=up.rpartition("/")[2])
+    for one in drawn:
+        one.locator("canvas:not(.stale)").wait_for()
+        one.get_by_text("1 region is in it").wait_for()
+    assert [(body["x"], body["y"]) for body in asked[2:]] == 2 * [(up, across)]
+    drawn[0].locator("canvas").press("ArrowRight")
+    places = [one.locator("canvas").get_attribute("aria-label").partition(" up.")[0] for one in drawn]
+    assert places[0] == places[1]
+    slices.locator("select").last.select_option(label=f"the seed of {other[:8]}")
+    drawn[0].get_by_text("1 region is in it").wait_for()
+    assert barriers(page) == []
+
+
+def test_slices_need_two_joints_in_common(page: Any, url: str, region: str, planar_region: str) -> None:
+    page.goto(f"{url}/compare?a={region}&b={planar_region}")
+    page.get_by_text("A slice of both needs two joints of the same names.").wait_for()
 
 
 def test_regions_of_different_robots_are_matched_by_name(client: TestClient, region: str, planar_region: str) -> None:

@@ -11,8 +11,10 @@ from fastapi.testclient import TestClient
 
 from certifier.jobs.region import Region
 from certifier.model import Scene
-from db import jobs, scenes
+from db import events, jobs, scenes
 from db.session import Database
+from jobs.cover import COVERED
+from planner.cover.options import CoverOptions
 from tests.api.conftest import store_region
 from tests.api.test_conditions import upright
 from tests.certifier.scenes import planar_arm
@@ -64,8 +66,62 @@ def test_two_jobs_are_compared(page: Any, url: str, client: TestClient, database
     page.get_by_text("2 options are the same in both.").wait_for()
     row = page.get_by_role("row").filter(has_text="Pairs settled in the last iteration").locator("td")
     assert row.all_text_contents() == ["2 of 2", "\N{EN DASH}"]
-    assert page.locator(f'.halves a[href="/regions/{region}"]').count() == 1
+    kept = page.get_by_role("region", name="Kept of the starting region, over time", exact=True)
+    kept.get_by_text("nothing yet").wait_for()
+    assert kept.locator(f'.halves a[href="/regions/{region}"]').count() == 1
     assert barriers(page) == []
+
+
+def covering(database: Database, *looks: tuple[float, int]) -> str:
+    """A cover that ran, and saw these shares covered by so many regions."""
+    with database.write() as session:
+        job, _ = jobs.create(
+            session, kind="cover", scene_id=scenes.get(session, "slider").id, options=CoverOptions.from_document({}).to_document()
+        )
+        jobs.start(session, job)
+        for share, regions in looks:
+            events.emit(session, job, COVERED, {"coverage": {"value": share, "stderr": 0.01, "samples": 100}, "regions": regions})
+        return job.id
+
+
+def test_what_two_covers_have_reached_is_one_picture(page: Any, url: str, database: Database, scene: Scene, barriers: Any) -> None:
+    one, other = covering(database, (0.0, 0), (0.4, 2), (0.7, 3)), covering(database, (0.2, 1), (0.5, 2))
+    page.goto(f"{url}/compare/jobs?a={one}&b={other}")
+    covered = page.get_by_role("region", name="Covered, over time", exact=True)
+    drawn = covered.get_by_role("img", name="Covered, over time")
+    drawn.wait_for()
+    assert [drawn.locator(mark).count() for mark in ("path.of-0", "path.of-1", "circle", "rect")] == [1, 1, 3, 2]
+    assert covered.locator("figcaption code").all_text_contents() == [one[:8], other[:8]]
+    rows = page.get_by_role("region", name=f"Covered, over time, by job {other[:8]}").locator("tbody tr")
+    assert [row.locator("td").all_text_contents()[::2] for row in rows.all()] == [["1", "20 %"], ["2", "50 %"]]
+    assert page.get_by_text("Kept of the starting region").count() == 0
+    assert barriers(page) == []
+
+
+def test_what_jobs_are_measured_by_differs(page: Any, url: str, client: TestClient, database: Database, region: str) -> None:
+    """The share of a starting region and that of all free configurations are not drawn over each other."""
+    grown, cover = client.get(f"/v1/regions/{region}").json()["job"], covering(database, (0.2, 1), (0.5, 2))
+    page.goto(f"{url}/compare/jobs?a={grown}&b={cover}")
+    for name, drawn in (("Kept of the starting region, over time", 1), ("Covered, over time", 2)):
+        one = page.get_by_role("region", name=name, exact=True)
+        one.get_by_role("img").wait_for()
+        assert one.get_by_role("img").locator("circle").count() == drawn
+        assert one.locator("path.of-1").count() == 0
+
+
+def test_the_page_of_a_cover_shows_what_is_covered_over_time(
+    page: Any, url: str, client: TestClient, database: Database, scene: Scene
+) -> None:
+    cover = covering(database, (0.0, 0), (0.4, 2), (0.7, 3))
+    assert [point[1:] for point in client.get(f"/v1/jobs/{cover}/cover").json()["curve"]] == [[0.0, 0], [0.4, 2], [0.7, 3]]
+    page.goto(f"{url}/jobs/{cover}")
+    covered = page.get_by_role("region", name="Covered, over time").first
+    covered.get_by_text("70 % of the free configurations are in regions of the scene after").wait_for()
+    assert covered.get_by_role("img").locator("circle").count() == 3
+    # The page follows the job.
+    with database.write() as session:
+        events.emit(session, jobs.lock(session, cover), COVERED, {"coverage": {"value": 0.8, "stderr": 0.01, "samples": 100}, "regions": 4})
+    covered.get_by_text("80 % of the free configurations").wait_for()
 
 
 def test_two_versions_of_a_scene_are_compared(page: Any, url: str, database: Database, upright: Scene, barriers: Any) -> None:

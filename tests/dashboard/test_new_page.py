@@ -403,7 +403,7 @@ def test_what_the_service_refuses_is_said_and_nothing_is_lost(opened: Any, clien
         ),
     )
     opened.get_by_role("button", name="Start the job").click()
-    opened.get_by_text("too many. wait").wait_for()
+    opened.get_by_text("too many (wait)").wait_for()
     assert opened.get_by_role("button", name="Start the job").is_enabled()
     assert jobs(client) == []
     assert complaints.pop().startswith(f"{REFUSED}429")
@@ -413,7 +413,7 @@ def test_a_scene_is_uploaded_as_the_zip_of_its_directory(page: Any, url: str, cl
     page.goto(f"{url}/new")
     page.get_by_text("none yet").wait_for(state="attached")
     page.get_by_label("or upload one").set_input_files({"name": "bad.zip", "mimeType": "application/zip", "buffer": b"no zip"})
-    page.get_by_text("bad.zip is no scene that can be used. this is no zip of a scene").wait_for()
+    page.get_by_text("bad.zip is no scene that can be used: this is no zip of a scene").wait_for()
     assert complaints.pop().startswith(f"{REFUSED}422")
     data = io.BytesIO()
     with zipfile.ZipFile(data, "w") as archive:

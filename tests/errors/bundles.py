@@ -22,7 +22,10 @@ BUNDLES: Table = {
         lambda t: t.unpack(*((f"{i}.obj", "") for i in range(1001))),
         lambda t: load_bundle(t.pack(), BundleLimits(unpacked_bytes=100)),
     ],
-    ("bundle_file", ""): [lambda t: t.stranger(run__sh="true"), lambda t: t.stranger(arm__urdf=XACRO)],
+    ("bundle_file", ""): [
+        lambda t: t.stranger(arm__urdf="<robot><mesh filename='run.sh'/></robot>", run__sh="true"),
+        lambda t: t.stranger(arm__urdf=XACRO),
+    ],
     ("bundle_text", ""): [lambda t: t.stranger(m__gltf=b"\xff\xfe"), lambda t: t.stranger(m__gltf="{"), lambda t: t.stranger(m__gltf="[]")],
     ("bundle_uri", ""): [
         lambda t: t.pack(shape='<mesh filename="/m.obj"/>'),

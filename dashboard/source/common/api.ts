@@ -12,9 +12,9 @@ export class ServiceError extends Error {
     super(message);
   }
 
-  /** All of it in one sentence or two, for people. */
+  /** All of it in a sentence, for people, as the command says it. */
   get text(): string {
-    return [this.message, this.hint].filter(Boolean).join(". ");
+    return this.hint ? `${this.message} (${this.hint})` : this.message;
   }
 }
 

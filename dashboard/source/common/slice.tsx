@@ -24,14 +24,55 @@ interface Props {
   way?: number[][];
 }
 
+type Axes = [number, number];
+
 const SIZE = 90;
 const PAUSE_MS = 180;
 const STEP = 1 / 60; // of an axis, a key press
 const PAD = { left: 52, right: 10, top: 10, bottom: 34 };
 
+/** A slice with the choice of its joints. */
 export function Slice(props: Props) {
-  const { scene, space, units, q, onPick, regions, strongest = null, cells = null, way } = props;
-  const [axes, setAxes] = useState<[number, number]>([0, Math.min(1, space.joints.length - 1)]);
+  const [axes, setAxes] = useState<Axes>([0, 1]);
+  const { joints } = props.space;
+  if (joints.length < 2) return <p class="empty">A slice needs two joints; this scene has one.</p>;
+  return (
+    <div class="slice">
+      <AxesChoice joints={joints} axes={axes} onChange={setAxes} />
+      <SliceOf {...props} axes={axes} />
+    </div>
+  );
+}
+
+/** Two different ones of at least two joints. */
+export function AxesChoice({ joints, axes, onChange }: { joints: string[]; axes: Axes; onChange: (axes: Axes) => void }) {
+  const names = shortNames(joints);
+  const choose = (place: 0 | 1, value: number): void => {
+    const next: Axes = [...axes];
+    // Whoever names the joint of the other axis swaps the two.
+    if (next[1 - place] === value) next[1 - place] = next[place]!;
+    next[place] = value;
+    onChange(next);
+  };
+  return (
+    <div class="axes">
+      {(["across", "up"] as const).map((word, place) => (
+        <label key={word}>
+          {word}{" "}
+          <select value={axes[place]} onChange={(event) => choose(place as 0 | 1, Number(event.currentTarget.value))}>
+            {names.map((name, i) => (
+              <option value={i} key={name}>{name}</option>
+            ))}
+          </select>
+        </label>
+      ))}
+    </div>
+  );
+}
+
+/** The slice along two joints, given by their places among those of the space. */
+export function SliceOf(props: Props & { axes: Axes }) {
+  const { scene, space, units, q, onPick, regions, strongest = null, cells = null, way, axes } = props;
   const [known, setKnown] = useState<{ asked: string; answer: SliceResponse } | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
   const [scheme, setScheme] = useState(0);
@@ -43,7 +84,6 @@ export function Slice(props: Props) {
   const fixed = q.map((value, i) => (i === x || i === y ? null : value)).join();
   const asked = `${scene} ${x} ${y} ${fixed} ${regions?.join()}`;
   useEffect(() => {
-    if (x === y) return; // a scene of one joint
     const stop = new AbortController();
     const timer = setTimeout(() => {
       const body = { scene, q, x: space.joints[x], y: space.joints[y], size: SIZE, ...(regions && { regions }) };
@@ -101,29 +141,9 @@ export function Slice(props: Props) {
     next[y] = clamp(answer.y.lower + up * (answer.y.upper - answer.y.lower), answer.y);
     onPick(next);
   };
-  const choose = (place: 0 | 1, value: number): void => {
-    const next: [number, number] = [...axes];
-    // Whoever names the joint of the other axis swaps the two.
-    if (next[1 - place] === value) next[1 - place] = next[place]!;
-    next[place] = value;
-    setAxes(next);
-  };
-  if (space.joints.length < 2) return <p class="empty">A slice needs two joints; this scene has one.</p>;
   const at = (i: number): string => `${names[i]} ${shown(q[i]!, units[i]!)}`;
   return (
-    <figure class="slice">
-      <div class="axes">
-        {(["across", "up"] as const).map((word, place) => (
-          <label key={word}>
-            {word}{" "}
-            <select value={axes[place]} onChange={(event) => choose(place as 0 | 1, Number(event.currentTarget.value))}>
-              {names.map((name, i) => (
-                <option value={i} key={name}>{name}</option>
-              ))}
-            </select>
-          </label>
-        ))}
-      </div>
+    <figure>
       <canvas
         ref={canvas}
         class={current ? "" : "stale"}

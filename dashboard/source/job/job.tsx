@@ -4,6 +4,7 @@ import { useEffect, useMemo, useReducer, useState } from "preact/hooks";
 import { get, said } from "../common/api";
 import type { SceneModel } from "../common/schema";
 import type { Unit } from "../common/units";
+import { measureOf } from "./curve";
 import { Growth } from "./growth";
 import { Log } from "./log";
 import { Matrix, Memory } from "./matrix";
@@ -21,10 +22,10 @@ function Moved(props: { job: string; scene: string }) {
   return Motion ? <Motion {...props} /> : <div class="coming" />;
 }
 
-export function JobIsland({ job, subject, scene, ended, begun, units }: { job: string; subject: string; scene: string; ended: boolean; begun: number; units: Unit[] }) {
+export function JobIsland({ job, kind, subject, scene, ended, begun, units }: { job: string; kind: string; subject: string; scene: string; ended: boolean; begun: number; units: Unit[] }) {
   const [version, changed] = useReducer((count: number) => count + 1, 0);
   const [robot, setRobot] = useState<Drawable>({ model: null, problem: null });
-  const store = useMemo(() => new JobStore(job, ended, begun, units, () => changed(undefined)), [job]);
+  const store = useMemo(() => new JobStore(job, measureOf(kind), ended, begun, units, () => changed(undefined)), [job]);
   const memory = useMemo(() => new Memory(), []);
   const route = useRoute();
   useEffect(() => {
@@ -61,7 +62,7 @@ export function JobIsland({ job, subject, scene, ended, begun, units }: { job: s
         <>
           {store.iterations.length > 0 && <Matrix store={store} version={version} memory={memory} />}
           {store.ended && subject === "the motion" && <Moved job={job} scene={scene} />}
-          <Growth points={store.growth} />
+          <Growth job={job} measure={store.measure} points={store.reached} />
           <Obstacles
             obstacles={store.obstacles}
             robot={robot}

@@ -37,6 +37,7 @@ export function plural(count: number, one: string): string {
 }
 
 export function duration(seconds: number): string {
+  if (seconds === 0) return "0 s";
   if (seconds < 0.1) return `${(1000 * seconds).toFixed(1)} ms`;
   if (seconds < 100) return `${seconds.toFixed(1)} s`;
   if (seconds < 6000) return `${Math.floor(seconds / 60)} min ${Math.floor(seconds % 60)} s`;

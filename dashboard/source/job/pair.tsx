@@ -150,15 +150,15 @@ function Iterations({ store, pair, current }: { store: JobStore; pair: number; c
 
 /** Leads to the region of the iteration, or to the job's last one, whose page draws the pair's plane at each configuration. */
 function Planes({ store, pair, iteration }: { store: JobStore; pair: number; iteration: number | undefined }) {
-  const point = store.growth.find((one) => one.iteration === iteration) ?? store.growth.at(-1);
-  if (!point) return null;
+  const point = store.reached.find((one) => one.number === iteration) ?? store.reached.at(-1);
+  if (!point?.region) return null;
   return (
     <p>
       The page of{" "}
       <a href={`/regions/${point.region}#pair=${pair}`}>
         region <code>{point.region.slice(0, 8)}</code>
       </a>
-      , of iteration {point.iteration}, draws the plane between the two at each configuration.
+      , of iteration {point.number}, draws the plane between the two at each configuration.
     </p>
   );
 }

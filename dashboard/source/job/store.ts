@@ -2,7 +2,8 @@
 // it follows the events, and asks only for the pairs that they name.
 import { refresh, connected } from "../live";
 import { follow, get, said } from "../common/api";
-import type { Event, EventList, GrowthCurve, GrowthPoint, HeldWork, IterationStates, JobWorkers, Obstacle, Obstacles, PairCell, PairInfo, PairMatrix, PairStates, SceneModel } from "../common/schema";
+import type { Event, EventList, HeldWork, IterationStates, JobWorkers, Obstacle, Obstacles, PairCell, PairInfo, PairMatrix, PairStates, SceneModel } from "../common/schema";
+import type { Measure, Point } from "./curve";
 import type { Unit } from "../common/units";
 
 /** The robot as it is drawn, once it is there, or why it is not. */
@@ -38,7 +39,8 @@ export class JobStore {
   /** IterationStates -> pair -> its result, for the iterations that somebody has looked at. */
   readonly details = new Map<number, Map<number, PairCell>>();
   events: Event[] = [];
-  growth: GrowthPoint[] = [];
+  /** What the job has reached over time. */
+  reached: Point[] = [];
   workers: HeldWork[] = [];
   obstacles: Obstacle[] | null = null;
   loaded = false;
@@ -56,6 +58,7 @@ export class JobStore {
 
   constructor(
     readonly job: string,
+    readonly measure: Measure,
     public ended: boolean,
     /** How many iterations had begun when the page was made. */
     private readonly begun: number,
@@ -226,12 +229,12 @@ export class JobStore {
 
   /** What is around the matrix, and changes more seldom. */
   private async around(): Promise<void> {
-    const [{ points }, { obstacles }, { workers }] = await Promise.all([
-      get<GrowthCurve>(`${this.path}/growth`),
+    const [reached, { obstacles }, { workers }] = await Promise.all([
+      this.measure.points(this.job),
       get<Obstacles>(`${this.path}/obstacles`),
       get<JobWorkers>(`${this.path}/workers`),
     ]);
-    this.growth = points;
+    this.reached = reached;
     this.obstacles = obstacles;
     this.workers = workers;
   }

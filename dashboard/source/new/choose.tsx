@@ -39,7 +39,7 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
       setAdded(scene);
       onUpload(scene);
     } catch (reason) {
-      setProblem(`${name} is no scene that can be used. ${said(reason)}`);
+      setProblem(`${name} is no scene that can be used: ${said(reason)}`);
     }
     setSending(null);
   };
@@ -70,10 +70,14 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
         </select>
       </p>
       <p>
-        <label for="new-upload">or upload one</label>
-        <input id="new-upload" type="file" accept=".zip,.urdf,.sdf,.mjcf,application/zip" disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void send(chosenFiles(event.currentTarget.files))} />
-        <label for="new-folder">or its folder</label>
-        <input id="new-folder" type="file" {...{ webkitdirectory: true }} disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void send(chosenFiles(event.currentTarget.files))} />
+        <span class="file">
+          <label for="new-upload">or upload one</label>
+          <input id="new-upload" type="file" accept=".zip,.urdf,.sdf,.mjcf,application/zip" disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void send(chosenFiles(event.currentTarget.files))} />
+        </span>
+        <span class="file">
+          <label for="new-folder">or its folder</label>
+          <input id="new-folder" type="file" {...{ webkitdirectory: true }} disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void send(chosenFiles(event.currentTarget.files))} />
+        </span>
       </p>
       <p class="quiet small" id="new-upload-says">
         A folder, or a zip of it, with <code>scene.yaml</code> and every model and mesh that it refers to. Or a robot alone: its URDF, SDFormat or MJCF file, or a folder that has one and its meshes; the service then drafts the scene, as <code>ciris scene init</code> does. Or drop it anywhere on this page.

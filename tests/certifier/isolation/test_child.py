@@ -31,7 +31,8 @@ def refuse(payload):
     raise RegionError("seed_wrong_length", "has 3 numbers", field="seed.q", hint="give 7")
 
 def abort(payload):
-    print("about to abort", file=sys.stderr, flush=True)
+    for _ in range(3):
+        print("about to abort", file=sys.stderr, flush=True)
     os.abort()
 
 def hog(payload):

@@ -130,8 +130,8 @@ def test_what_is_broken_in_a_bundle_is_named_without_the_servers_paths(tmp_path)
         ({"m.gltf": json.dumps({"buffers": [{"uri": "../x.bin"}]})}, "bundle_uri", "leads out"),
         ({"m.gltf": "[" * 100000}, "bundle_text", "m.gltf"),
         ({"m.gltf": "[]"}, "bundle_text", "m.gltf"),
-        ({"m.usda": "#usda 1.0"}, "bundle_file", "m.usda"),
-        ({"run.sh": "true"}, "bundle_file", "run.sh"),
+        ({"arm.urdf": "<robot><mesh filename='m.usda'/></robot>", "m.usda": "#usda 1.0"}, "bundle_file", "m.usda"),
+        ({"room.sdf": "<sdf><uri>a.xacro</uri></sdf>", "a.xacro": "<robot><mesh filename='../m.obj'/></robot>"}, "bundle_uri", "leads out"),
         ({"scene.yaml": "packages: {up: ..}\n" + SCENE}, "bundle_uri", "packages.up"),
     ],
 )
@@ -151,6 +151,18 @@ def test_an_honest_directory_passes(tmp_path):
     )
     scene = write(tmp_path, files={"more.urdf": honest, "m.obj": TETRAHEDRON, "README.yaml": "license: http://example.org\n"})
     check_bundle(tmp_path, scene)
+
+
+def test_what_a_package_has_beside_its_robot_is_deleted_before_drake_sees_anything(tmp_path):
+    manifest = "<package><name>arm</name><url type='website'>http://example.org</url></package>"
+    beside = {"LICENSE": "", "README.md": "", "launch/show.launch": "<launch/>", "run.sh": "true", "arm.urdf.xacro": "<robot", "m.usda": ""}
+    scene = write(tmp_path)
+    kept = {file for file in tmp_path.rglob("*") if file.is_file()}
+    for name, content in {**beside, "package.xml": manifest}.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(content)
+    check_bundle(tmp_path, scene)
+    assert {file for file in tmp_path.rglob("*") if file.is_file()} == kept
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,1 @@
+import{c as o,g as r}from"./chunk-DP73IOPF.js";import{f as t,i as e}from"./chunk-BAYTPQX6.js";function d({place:n,children:i}){return o(()=>e(r(t,{children:i}),m(n))),o(()=>()=>e(null,m(n)),[n]),null}function m(n){return document.getElementById(`claim-${n}`)}export{d as a};
