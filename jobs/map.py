@@ -128,8 +128,8 @@ class Map(Kind):
         return super().is_late(session, job, now) and (super().is_late(session, job, now - GRACE) or jobs.untouched(job))
 
     def stop(self, session: Session, job: JobRow, afterwards: Afterwards) -> None:
-        """Has what was found until now stored."""
-        if maps.has_any(session, job.id):
+        """Has what was found until now stored, also in the round that is under way."""
+        if maps.keep_done(session, job):
             _store(session, job, afterwards)
 
     def result(self, session: Session, job: JobRow) -> dict[str, Any]:
