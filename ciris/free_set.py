@@ -152,10 +152,10 @@ class FreeSet(InSpace):
         from ciris.lookups import open_ranges
 
         rows, ends = self._one(start, end)
+        ranges, clauses = open_ranges(self._cells, rows, ends)
         parts = []
-        for clause, pairs in enumerate(self.clauses):
-            for begin, until in _joined(open_ranges(self._cells, clause, rows, ends)):
-                parts.append(OpenPart(begin, until, pairs))
+        for clause in np.unique(clauses).tolist():
+            parts += [OpenPart(begin, until, self.clauses[clause]) for begin, until in _joined(ranges[clauses == clause])]
         return tuple(sorted(parts, key=lambda part: (part.start, part.end)))
 
     def proved_parts(self, start: ArrayLike, end: ArrayLike) -> Array:
@@ -167,8 +167,7 @@ class FreeSet(InSpace):
         from ciris.lookups import open_ranges
 
         rows, ends = self._one(start, end)
-        ranges = [open_ranges(self._cells, clause, rows, ends) for clause in range(len(self.clauses))]
-        ordered = _joined(np.concatenate(ranges))
+        ordered = _joined(open_ranges(self._cells, rows, ends)[0])
         proved = zip([0.0, *(until for _, until in ordered)], [*(begin for begin, _ in ordered), 1.0], strict=True)
         return np.array([part for part in proved if part[0] < part[1]]).reshape(-1, 2)
 

@@ -142,11 +142,23 @@ def _within(cells: Cells, x: Floats) -> bool:
     return inside
 
 
-@njit(cache=True)
-def open_ranges(cells: Cells, clause: int, x: Floats, y: Floats) -> Floats:
-    """Returns the ranges of t, (k, 2), in which no tree of a clause has a proved cell. They may overlap."""
-    ranges, count = _open_in_clause(cells, clause, x, y, False, _stack(), np.empty((ROOM, 2)), np.empty((ROOM, 2)))
-    return ranges[:count].copy()
+@njit(cache=True, nogil=True)
+def open_ranges(cells: Cells, x: Floats, y: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    """Returns the ranges of t, (k, 2), in which no tree of a clause has a proved cell, and the clause of each, (k,).
+
+    Those of one clause may overlap.
+    """
+    stack, ranges, others = _stack(), np.empty((ROOM, 2)), np.empty((ROOM, 2))
+    found, clauses, n = np.empty((ROOM, 2)), np.empty(ROOM, np.int64), 0
+    for clause in range(len(cells.first) - 1):
+        mine, count = _open_in_clause(cells, clause, x, y, False, stack, ranges, others)
+        if n + count > len(found):
+            before, before_clauses, room = found, clauses, 2 * (n + count)
+            found, clauses = np.empty((room, 2)), np.empty(room, np.int64)
+            found[:n], clauses[:n] = before[:n], before_clauses[:n]
+        found[n : n + count], clauses[n : n + count] = mine[:count], clause
+        n += count
+    return found[:n].copy(), clauses[:n].copy()
 
 
 @njit(cache=True)
