@@ -18,6 +18,7 @@ from benchmarks import (
     cover,
     fleet,
     growth,
+    lookups,
     makers,
     maps,
     models,
@@ -104,6 +105,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "robots": lambda args, screen: robots.robots(args.robots, args.deadline, screen.line),
     "arms": lambda args, screen: makers.arms(args.arms, args.deadline, args.motions, screen.line),
     "map": lambda args, screen: maps.maps(args.scenes, args.limit, screen.line, args.drake),
+    "lookups": lambda args, screen: lookups.lookups(args.scenes, args.cells, args.limit, screen.line),
     "recertify": lambda args, screen: recertify.changes(args.scenes, args.limit, screen.line),
     "query": lambda args, screen: query.query(args.regions, screen.line),
     "plan": lambda args, screen: plan.motions(args.scene, args.url, args.queries, args.points, screen.line),
@@ -207,7 +209,12 @@ def _parser() -> ArgumentParser:
     mapped.add_argument(
         "--drake", type=_count, default=0, metavar="N", help="Drake looks for collisions at N configurations of each free set; default 0"
     )
-
+    looked = kinds.add_parser("lookups", parents=[as_json], help="look configurations and motions up in free sets of very many cells")
+    looked.add_argument("scenes", nargs="*", metavar="EXAMPLE", default=list(lookups.SCENES), help=f"default: {', '.join(lookups.SCENES)}")
+    looked.add_argument("--cells", type=_count, default=lookups.CELLS, metavar="N", help=f"how many are proved; default {lookups.CELLS}")
+    looked.add_argument(
+        "--limit", type=float, default=lookups.LIMIT, metavar="SECONDS", help=f"each map grows for this long; default {lookups.LIMIT:g}"
+    )
     changed = kinds.add_parser("recertify", parents=[as_json], help="certify regions again whose scenes have changed, and grow them anew")
     changed.add_argument(
         "scenes", nargs="*", metavar="EXAMPLE", default=list(recertify.SCENES), help=f"default: {', '.join(recertify.SCENES)}"

@@ -436,6 +436,18 @@ def _map(document: Document) -> list[str]:
     return [_table(header, rows)]
 
 
+def _lookups(document: Document) -> list[str]:
+    """Returns a table with one line for each scene."""
+    names = {"point": "point", "batch": "1000 points", "motion": "motion"}
+    asked = [(what, which) for what in names for which in ("p50", "p99")]
+    rows = []
+    for row in document["rows"]:
+        sizes = [str(row[size]) for size in ("trees", "grown", "cells")]
+        rows.append([row["example"], *sizes, *(f"{1e6 * row[what][which]:.0f}" for what, which in asked)])
+    header = ["example", "trees", "cells grown", "cells", *(f"{names[what]}, {which}" for what, which in asked)]
+    return ["Microseconds of processor time.", _table(header, rows)]
+
+
 _TABLES: dict[str, Callable[[Document], list[str]]] = {
     "pairs": _compared,
     "scene": _compared,
@@ -453,5 +465,6 @@ _TABLES: dict[str, Callable[[Document], list[str]]] = {
     "plan": _plan,
     "recertify": _recertify,
     "map": _map,
+    "lookups": _lookups,
     "cover": _cover,
 }

@@ -113,7 +113,7 @@ class FreeSet(InSpace):
         return found
 
     def __repr__(self) -> str:
-        return f"<FreeSet of {self.name}: {len(self.clauses)} groups of pairs, {len(self._cells.joint)} nodes>"
+        return f"<FreeSet of {self.name}: {len(self.clauses)} groups of pairs, {len(self._cells.nodes)} cuts>"
 
     def contains(self, q: ArrayLike) -> NDArray[np.bool_]:
         """Returns which configurations are proved to be free, (..., n) -> (...).
@@ -126,12 +126,9 @@ class FreeSet(InSpace):
         from ciris.lookups import points
 
         given = self.space.points(q, "q")
-        rows = np.ascontiguousarray(given.reshape(-1, len(self.joints)))
-        found = self._within(rows)
-        held = np.empty(np.count_nonzero(found), bool)
-        points(self._cells, rows[found], held)
-        found[found] = held
-        return found.reshape(given.shape[:-1])
+        found = np.empty(given.shape[:-1], bool)
+        points(self._cells, np.ascontiguousarray(given.reshape(-1, len(self.joints))), found.reshape(-1))
+        return found
 
     def contains_motion(self, start: ArrayLike, end: ArrayLike) -> NDArray[np.bool_]:
         """Returns which motions that are straight in q are proved to be free all along, (..., n) and (..., n) -> (...).
@@ -142,12 +139,9 @@ class FreeSet(InSpace):
         from ciris.lookups import motions
 
         first, rows, ends = self._ends(start, end)
-        found = self._within(rows)
-        found &= self._within(ends)
-        held = np.empty(np.count_nonzero(found), bool)
-        motions(self._cells, rows[found], ends[found] - rows[found], held)
-        found[found] = held
-        return found.reshape(first.shape[:-1])
+        found = np.empty(first.shape[:-1], bool)
+        motions(self._cells, rows, ends, found.reshape(-1))
+        return found
 
     def open_parts(self, start: ArrayLike, end: ArrayLike) -> tuple[OpenPart, ...]:
         """Returns where a motion from one configuration straight to another, (n,) each, is not proved to be free, for each group of pairs.
@@ -158,10 +152,10 @@ class FreeSet(InSpace):
         from ciris.lookups import open_ranges
 
         rows, ends = self._one(start, end)
+        ranges, clauses = open_ranges(self._cells, rows, ends)
         parts = []
-        for clause, pairs in enumerate(self.clauses):
-            for begin, until in _joined(open_ranges(self._cells, clause, rows, ends - rows)):
-                parts.append(OpenPart(begin, until, pairs))
+        for clause in np.unique(clauses).tolist():
+            parts += [OpenPart(begin, until, self.clauses[clause]) for begin, until in _joined(ranges[clauses == clause])]
         return tuple(sorted(parts, key=lambda part: (part.start, part.end)))
 
     def proved_parts(self, start: ArrayLike, end: ArrayLike) -> Array:
@@ -173,8 +167,7 @@ class FreeSet(InSpace):
         from ciris.lookups import open_ranges
 
         rows, ends = self._one(start, end)
-        ranges = [open_ranges(self._cells, clause, rows, ends - rows) for clause in range(len(self.clauses))]
-        ordered = _joined(np.concatenate(ranges))
+        ordered = _joined(open_ranges(self._cells, rows, ends)[0])
         proved = zip([0.0, *(until for _, until in ordered)], [*(begin for begin, _ in ordered), 1.0], strict=True)
         return np.array([part for part in proved if part[0] < part[1]]).reshape(-1, 2)
 
@@ -211,9 +204,6 @@ class FreeSet(InSpace):
             raise RegionError("motion", f"the shapes are {first.shape} and {second.shape}", field="end", hint="give one end for each start")
         return first, np.ascontiguousarray(first.reshape(-1, n)), np.ascontiguousarray(second.reshape(-1, n))
 
-    def _within(self, rows: Array) -> NDArray[np.bool_]:
-        return np.asarray(((self.space.q_lower <= rows) & (rows <= self.space.q_upper)).all(axis=1))
-
 
 def _read(data: bytes) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     """Returns the head and the arrays of a file.
@@ -249,21 +239,23 @@ def _checked(cls: type[FreeSet], head: dict[str, Any], arrays: dict[str, NDArray
     arrays = {name: frozen(array, array.dtype) for name, array in arrays.items()}
     space = Space(tuple(joints), arrays["q_star"], arrays["q_lower"], arrays["q_upper"], arrays["revolute"])
     tolerance = frozen(TOLERANCE * np.maximum(np.maximum(np.abs(space.q_lower), np.abs(space.q_upper)), 1))
-    cells = lookups.Cells(*(arrays[name] for name in lookups.Cells._fields[:-1]), tolerance)
-    inner = np.flatnonzero(cells.joint >= 0)
-    parts = np.concatenate([inner + 1, cells.upper[inner], cells.root])
+    joint, cut, upper, root, first, tree = (arrays[name] for name in ("joint", "cut", "upper", "root", "first", "tree"))
+    inner = np.flatnonzero(joint >= 0)
+    parts = np.concatenate([inner + 1, upper[inner], root])
     fits = [
         all(isinstance(joint, str) for joint in joints),
         np.isfinite(space.q_star).all() and np.isfinite(tolerance).all() and (space.q_lower <= space.q_upper).all(),
-        (cells.joint >= lookups.OPEN).all() and (cells.joint < n).all() and np.isfinite(cells.cut).all(),
-        (cells.upper[inner] > inner + 1).all() and (cells.upper[inner] < N).all(),
+        (joint >= lookups.OPEN).all() and (joint < n).all() and np.isfinite(cut).all(),
+        (upper[inner] > inner + 1).all() and (upper[inner] < N).all(),
         # Each node is the root of a tree, or a part of one other node. So these are trees.
-        len(parts) == N and len(np.unique(parts)) == N and (parts >= 0).all() and (parts < N).all(),
-        len(cells.first) == 1 + len(clauses) > 1 and cells.first[0] == 0 and cells.first[-1] == len(cells.tree),
-        (cells.first[1:] > cells.first[:-1]).all() and (cells.tree >= 0).all() and (cells.tree < len(cells.root)).all(),
+        len(parts) == N and (parts >= 0).all() and (parts < N).all() and np.bincount(parts, minlength=N).all(),
+        len(first) == 1 + len(clauses) > 1 and first[0] == 0 and first[-1] == len(tree),
+        (first[1:] > first[:-1]).all() and (tree >= 0).all() and (tree < len(root)).all(),
     ]
-    if not all(fits) or lookups.depth(cells.joint, cells.upper) > lookups.DEPTH:
+    if not all(fits) or lookups.depth(joint, upper) > lookups.DEPTH:
         raise ValueError("the arrays do not fit each other")
+    nodes, number = lookups.nodes_of(joint, cut, upper)
+    cells = lookups.Cells(frozen(nodes, nodes.dtype), frozen(number[root], np.int32), first, tree, space.q_lower, space.q_upper, tolerance)
     return cls(str(head["scene"]), str(head["name"]), space, clauses, cells)
 
 

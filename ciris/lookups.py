@@ -1,8 +1,8 @@
 """Compiled loops that look a motion up in the cells of a free set (ciris.free_set).
 
-A motion is straight in q, from ``x`` on, by ``dx`` while t goes from 0 to 1; a configuration is a motion by 0. A tree is walked with a
-range of t: at a cut, each part gets the range in which the motion is on its side, or nearer to the cut than a tolerance. The tolerance is
-far above rounding errors, so a walk visits every cell that the motion meets.
+A motion is straight in q, from ``x`` to ``y`` while t goes from 0 to 1; at a configuration, x is y. A tree is walked with a range of t: at
+a cut, each part gets the range in which the motion is on its side, or nearer to the cut than a tolerance. The tolerance is far above
+rounding errors, so a walk visits every cell that the motion meets.
 """
 
 from __future__ import annotations
@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 PROVED, OPEN = -1, -2
-"""These nodes of a tree are leaves: a cell with a proof, and one without."""
+"""In the place of a node, these are leaves: a cell with a proof, and one without."""
+
+NODE = np.dtype([("cut", np.float64), ("upper", np.int32), ("joint", np.int16), ("lower", np.int16)])
+"""A cut of a tree, in one piece, because a step down a large tree takes as long as the memory does.
+
+``joint`` is cut at ``cut``, in q. ``upper`` is the node of the upper part, or a leaf. The lower part's node follows, where ``lower`` is no
+leaf.
+"""
 
 DEPTH = 512
 """Trees are not deeper than this; ciris.free_set refuses others."""
@@ -28,39 +35,61 @@ class Cells(NamedTuple):
     """The trees of a free set.
 
     Attributes:
-        joint: (N,) int16, for each node the joint that is cut, or PROVED, or OPEN. The lower part's node follows.
-        cut: (N,) where, in q.
-        upper: (N,) int32, the node of the upper part.
-        root: (T,) int32, the first node of each tree.
+        nodes: of all trees.
+        root: (T,) int32, the first node of each tree, or a leaf.
         first: (K + 1,) int32, where the trees of each clause begin in ``tree``.
         tree: int32, the trees of all clauses. A clause holds where one of its trees has a proved cell.
+        q_lower, q_upper: (n,) the joint limits.
         tolerance: (n,) of each joint.
     """
 
-    joint: NDArray[np.int16]
-    cut: Floats
-    upper: NDArray[np.int32]
+    nodes: NDArray[np.void]
     root: NDArray[np.int32]
     first: NDArray[np.int32]
     tree: NDArray[np.int32]
+    q_lower: Floats
+    q_upper: Floats
     tolerance: Floats
+
+
+def nodes_of(joint: NDArray[np.int16], cut: Floats, upper: NDArray[np.int32]) -> tuple[NDArray[np.void], NDArray[np.int32]]:
+    """Returns the cuts of trees, of type NODE, and for each given node which of these it is, or which leaf.
+
+    Args:
+        joint: for each node, in preorder, the joint that is cut, or PROVED, or OPEN.
+        cut: where, in q.
+        upper: the node of the upper part.
+    """
+    inner = np.flatnonzero(joint >= 0)
+    number = joint.astype(np.int32)
+    number[inner] = np.arange(len(inner))
+    nodes = np.zeros(len(inner), NODE)
+    nodes["cut"], nodes["joint"], nodes["upper"] = cut[inner], joint[inner], number[upper[inner]]
+    nodes["lower"] = np.minimum(number[inner + 1], 0)
+    return nodes, number
 
 
 @njit(cache=True, nogil=True)
 def points(cells: Cells, X: Floats, found: NDArray[np.bool_]) -> None:
-    """Fills in which configurations (m, n) are free. All of them are looked up in one tree after the other, which stays in the cache."""
-    stack, room, still = _stack(), np.empty((2, ROOM, 2)), np.zeros(X.shape[1])
-    left, count = np.arange(len(X)), len(X)
+    """Fills in which configurations (m, n) are within the joint limits and free.
+
+    All of them are looked up in one tree after the other, which stays in the cache.
+    """
+    nodes, tolerance, stack, room = cells.nodes, cells.tolerance, _stack(), np.empty((2, ROOM, 2))
+    left, count = np.empty(len(X), np.int64), 0
+    for i in range(len(X)):
+        left[count] = i
+        count += _within(cells, X[i])
     for clause in range(len(cells.first) - 1):
         begin, end, n = cells.first[clause], cells.first[clause + 1], 0
         for place in range(count):
             i, leaf, near = left[place], OPEN, False
             for number in range(begin, end):
                 if leaf == OPEN:
-                    leaf, close = _leaf(cells, cells.root[cells.tree[number]], X[i])
+                    leaf, close = _leaf(nodes, tolerance, cells.root[cells.tree[number]], X[i])
                     near = near or close
             if near:
-                open_parts = _open_in_clause(cells, clause, X[i], still, True, stack, room[0], room[1])[1]
+                open_parts = _open_in_clause(cells, clause, X[i], X[i], True, stack, room[0], room[1])[1]
                 leaf = PROVED if open_parts == 0 else OPEN
             left[n] = i
             n += leaf == PROVED
@@ -71,35 +100,65 @@ def points(cells: Cells, X: Floats, found: NDArray[np.bool_]) -> None:
 
 
 @njit(cache=True)
-def _leaf(cells: Cells, root: int, x: Floats) -> tuple[int, bool]:
+def _leaf(nodes: NDArray[np.void], tolerance: Floats, root: int, x: Floats) -> tuple[int, bool]:
     """Returns the leaf of a tree that a configuration is in, and whether it is nearer to a cut than the tolerance."""
-    joint, cut, upper, tolerance = cells.joint, cells.cut, cells.upper, cells.tolerance
     node, near = root, False
-    j = joint[node]
-    while j >= 0:
-        beyond = x[j] - cut[node]
-        near = near | (abs(beyond) <= tolerance[j])
-        node = upper[node] if beyond > 0 else node + 1
-        j = joint[node]
-    return j, near
-
-
-@njit(cache=True, nogil=True)
-def motions(cells: Cells, X: Floats, dX: Floats, found: NDArray[np.bool_]) -> None:
-    """Fills in which motions (m, n) are free all along."""
-    stack, room, clauses = _stack(), np.empty((2, ROOM, 2)), len(cells.first) - 1
-    for i in range(len(X)):
-        x, dx, clause = X[i], dX[i], 0
-        while clause < clauses and _open_in_clause(cells, clause, x, dx, True, stack, room[0], room[1])[1] == 0:
-            clause += 1
-        found[i] = clause == clauses
+    while node >= 0:
+        at = nodes[node]
+        beyond = x[at.joint] - at.cut
+        near = near | (abs(beyond) <= tolerance[at.joint])
+        node = at.upper if beyond > 0 else _lower(nodes, node)
+    return node, near
 
 
 @njit(cache=True)
-def open_ranges(cells: Cells, clause: int, x: Floats, dx: Floats) -> Floats:
-    """Returns the ranges of t, (k, 2), in which no tree of a clause has a proved cell. They may overlap."""
-    ranges, count = _open_in_clause(cells, clause, x, dx, False, _stack(), np.empty((ROOM, 2)), np.empty((ROOM, 2)))
-    return ranges[:count].copy()
+def _lower(nodes: NDArray[np.void], node: int) -> int:
+    """Returns the node of the lower part."""
+    leaf = nodes[node].lower
+    return leaf if leaf < 0 else node + 1
+
+
+@njit(cache=True, nogil=True)
+def motions(cells: Cells, X: Floats, Y: Floats, found: NDArray[np.bool_]) -> None:
+    """Fills in which motions, from (m, n) to (m, n), are within the joint limits and free all along."""
+    nodes, tolerance, stack, room = cells.nodes, cells.tolerance, _stack(), np.empty((2, ROOM, 2))
+    for i in range(len(X)):
+        x, y, holds = X[i], Y[i], _within(cells, X[i]) and _within(cells, Y[i])
+        for clause in range(len(cells.first) - 1):
+            if not holds:
+                break
+            first, last = cells.first[clause], cells.first[clause + 1] - 1
+            holds = _open_in_tree(nodes, tolerance, cells.root[cells.tree[first]], x, y, 0.0, 1.0, True, stack, room[0], 0) == 0
+            if not holds and first < last:  # several trees may prove one part each
+                holds = _open_in_clause(cells, clause, x, y, True, stack, room[0], room[1])[1] == 0
+        found[i] = holds
+
+
+@njit(cache=True)
+def _within(cells: Cells, x: Floats) -> bool:
+    inside = True
+    for j in range(len(x)):
+        inside &= cells.q_lower[j] <= x[j] <= cells.q_upper[j]
+    return inside
+
+
+@njit(cache=True, nogil=True)
+def open_ranges(cells: Cells, x: Floats, y: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    """Returns the ranges of t, (k, 2), in which no tree of a clause has a proved cell, and the clause of each, (k,).
+
+    Those of one clause may overlap.
+    """
+    stack, ranges, others = _stack(), np.empty((ROOM, 2)), np.empty((ROOM, 2))
+    found, clauses, n = np.empty((ROOM, 2)), np.empty(ROOM, np.int64), 0
+    for clause in range(len(cells.first) - 1):
+        mine, count = _open_in_clause(cells, clause, x, y, False, stack, ranges, others)
+        if n + count > len(found):
+            before, before_clauses, room = found, clauses, 2 * (n + count)
+            found, clauses = np.empty((room, 2)), np.empty(room, np.int64)
+            found[:n], clauses[:n] = before[:n], before_clauses[:n]
+        found[n : n + count], clauses[n : n + count] = mine[:count], clause
+        n += count
+    return found[:n].copy(), clauses[:n].copy()
 
 
 @njit(cache=True)
@@ -110,7 +169,7 @@ def _stack() -> tuple[NDArray[np.int32], Floats]:
 
 @njit(cache=True)
 def _open_in_clause(
-    cells: Cells, clause: int, x: Floats, dx: Floats, one: bool, stack: tuple[NDArray[np.int32], Floats], ranges: Floats, others: Floats
+    cells: Cells, clause: int, x: Floats, y: Floats, one: bool, stack: tuple[NDArray[np.int32], Floats], ranges: Floats, others: Floats
 ) -> tuple[Floats, int]:
     """Returns the ranges of t in which no tree of a clause has a proved cell, and how many there are; at most one if ``one``.
 
@@ -121,11 +180,16 @@ def _open_in_clause(
     ranges[0, 0], ranges[0, 1], count = 0.0, 1.0, 1
     begin, end = cells.first[clause], cells.first[clause + 1]
     for place in range(begin, end):
-        root, first, n = cells.root[cells.tree[place]], one and place == end - 1, 0
-        for i in range(count):
-            others, n = _open_in_tree(cells, root, x, dx, ranges[i, 0], ranges[i, 1], first, stack, others, n)
-            if n and first:
-                break
+        root, first, i, n = cells.root[cells.tree[place]], one and place == end - 1, 0, 0
+        while i < count and not (n and first):
+            a, b = ranges[i]
+            more = _open_in_tree(cells.nodes, cells.tolerance, root, x, y, a, b, first, stack, others, n)
+            if more > len(others):
+                larger = np.empty((2 * len(others), 2))
+                larger[: len(others)] = others
+                others = larger
+            else:
+                n, i = more, i + 1
         ranges, others, count = others, ranges, n
         if count == 0:
             break
@@ -134,61 +198,68 @@ def _open_in_clause(
 
 @njit(cache=True)
 def _open_in_tree(
-    cells: Cells,
+    nodes: NDArray[np.void],
+    tolerance: Floats,
     root: int,
     x: Floats,
-    dx: Floats,
+    y: Floats,
     begin: float,
     end: float,
     first: bool,
     stack: tuple[NDArray[np.int32], Floats],
     found: Floats,
     n: int,
-) -> tuple[Floats, int]:
-    """Appends the ranges of t in which the motion may be in an open cell of a tree, or the first of them only."""
-    joint, cut, upper, tolerance = cells.joint, cells.cut, cells.upper, cells.tolerance
-    nodes, spans = stack
+) -> int:
+    """Puts the ranges of t in which the motion may be in an open cell of a tree, or the first of them only, behind the first n ranges.
+
+    Returns:
+        How many there are now; more than there is room for where there is too little.
+    """
+    waiting, spans = stack
     node, a, b, top = root, begin, end, 0
     while True:
-        j = joint[node]
-        if j >= 0:
-            v, near = cut[node], tolerance[j]
-            if dx[j] == 0.0:
-                low = x[j] <= v + near
-                if low and x[j] >= v - near:
-                    nodes[top], spans[top, 0], spans[top, 1] = upper[node], a, b
-                    top += 1
-                node = node + 1 if low else upper[node]
+        if node >= 0:
+            j, v, upper = nodes[node].joint, nodes[node].cut, nodes[node].upper
+            near = tolerance[j]
+            if max(x[j], y[j]) < v - near:  # most cuts are far from all of the motion
+                node = _lower(nodes, node)
                 continue
-            enters, leaves = (v - near - x[j]) / dx[j], (v + near - x[j]) / dx[j]
-            ahead, behind = node + 1, upper[node]  # The motion begins in the part ahead.
-            if dx[j] < 0:
+            if min(x[j], y[j]) > v + near:
+                node = upper
+                continue
+            way = y[j] - x[j]
+            if way == 0.0:
+                waiting[top], spans[top, 0], spans[top, 1] = upper, a, b
+                top += 1
+                node = _lower(nodes, node)
+                continue
+            enters, leaves = (v - near - x[j]) / way, (v + near - x[j]) / way
+            ahead, behind = _lower(nodes, node), upper  # The motion begins in the part ahead.
+            if way < 0:
                 enters, leaves, ahead, behind = leaves, enters, behind, ahead
             if leaves < a:
                 node = behind
             elif enters > b:
                 node = ahead
             else:
-                nodes[top], spans[top, 0], spans[top, 1] = behind, max(a, enters), b
+                waiting[top], spans[top, 0], spans[top, 1] = behind, max(a, enters), b
                 top += 1
                 node, b = ahead, min(b, leaves)
             continue
-        if j == OPEN:
+        if node == OPEN:
             if n and found[n - 1, 0] <= a <= found[n - 1, 1]:
                 found[n - 1, 1] = max(found[n - 1, 1], b)
+            elif n == len(found):
+                return n + 1
             else:
-                if n == len(found):
-                    more = np.empty((2 * n, 2))
-                    more[:n] = found
-                    found = more
                 found[n, 0], found[n, 1] = a, b
                 n += 1
             if first:
-                return found, n
+                return n
         if top == 0:
-            return found, n
+            return n
         top -= 1
-        node, a, b = nodes[top], spans[top, 0], spans[top, 1]
+        node, a, b = waiting[top], spans[top, 0], spans[top, 1]
 
 
 @njit(cache=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from certifier.errors import CirisError, ProofError, RegionError
+from certifier.map.ends import ENDS
 from certifier.map.options import MapOptions
 from certifier.model import Scene
 from certifier.options import read
@@ -27,16 +28,6 @@ from client.request import refuse_of_service, request
 from client.verify import in_child
 
 OK, NO, INTERRUPTED = 0, 1, 130
-ENDS = {
-    "coverage": "it covers as much as was asked for",
-    "deadline": "the deadline",
-    "nothing_left": "nothing is left that a map could prove",
-    "interrupted": "it was interrupted",
-    "cancelled": "somebody cancelled it",
-    "size": "the verifier would not read a larger file",
-    "worker_lost": "a process died; look whether the machine ran out of memory: fewer cores need less of it",
-}
-"""Why a map ended, in words."""
 NO_SAMPLE = 1.0
 """The standard error of a coverage that no sample tells anything about."""
 

@@ -92,9 +92,14 @@ def of_round(session: Session, job_id: str, round: int) -> dict[int, bytes]:
     return dict(rows)
 
 
-def has_any(session: Session, job_id: str) -> bool:
-    """Says whether anything was found for the job's map."""
-    return session.scalar(select(MapPieceRow.round).where(MapPieceRow.job_id == job_id).limit(1)) is not None
+def keep_done(session: Session, job: JobRow) -> bool:
+    """Keeps what the pieces of the round that is under way have found until now, and says whether the job's map has anything.
+
+    The caller holds the job's lock, and nobody leads the job any more.
+    """
+    last = session.scalar(select(func.max(MapPieceRow.round)).where(MapPieceRow.job_id == job.id))
+    found = settle(session, job, 0 if last is None else last + 1, {})
+    return last is not None or bool(found)
 
 
 def accepted(session: Session, job_id: str) -> tuple[dict[str, Any], bytes | None] | None:

@@ -13,11 +13,12 @@ from certifier import stored
 from certifier.errors import CirisError
 from certifier.growth.actions import Finish
 from certifier.jobs.map import ways_of
+from certifier.map.ends import ENDS
 from certifier.map.options import MapOptions
 from certifier.model import Scene
 from certifier.names import MAX_NAME
 from certifier.options import read
-from certifier.outcome import DEADLINE, Outcome
+from certifier.outcome import Outcome
 from db import jobs, maps, steps
 from db.models import JobRow
 from db.session import Database
@@ -32,13 +33,6 @@ from workers.app import send_work
 
 GRACE = timedelta(seconds=30)
 """The process that leads a job ends at the deadline by itself. Where it has not after this time, it is gone."""
-ENDS = {
-    "coverage": "the map covers as much as was asked for",
-    "deadline": DEADLINE,
-    "nothing_left": "nothing is left that a map could prove",
-    "size": "the verifier would not read a larger map",
-}
-"""Why a map ends, in words."""
 
 
 class MapRequestOptions(model_of(MapOptions)):  # type: ignore[misc]
@@ -134,8 +128,8 @@ class Map(Kind):
         return super().is_late(session, job, now) and (super().is_late(session, job, now - GRACE) or jobs.untouched(job))
 
     def stop(self, session: Session, job: JobRow, afterwards: Afterwards) -> None:
-        """Has what was found until now stored."""
-        if maps.has_any(session, job.id):
+        """Has what was found until now stored, also in the round that is under way."""
+        if maps.keep_done(session, job):
             _store(session, job, afterwards)
 
     def result(self, session: Session, job: JobRow) -> dict[str, Any]:

@@ -130,11 +130,11 @@ def _tree(scene: Scene, pairs: Sequence[Pair], part: PairMap) -> tuple[np.ndarra
     s[of_cuts] = part.cuts
     cuts = np.zeros(len(joints))
     cuts[inner] = scene.to_q(s)[of_cuts]
-    return _smallest(joints, cuts)
+    return smallest(joints, cuts)
 
 
 @njit(cache=True)
-def _smallest(joint: np.ndarray, cut: Array) -> tuple[np.ndarray, Array, np.ndarray]:
+def smallest(joint: np.ndarray, cut: Array) -> tuple[np.ndarray, Array, np.ndarray]:
     """Returns a tree in preorder with its upper parts, without the cuts whose both parts are wholly proved, or wholly open."""
     N = len(joint)
     kind, size, left = joint.copy(), np.ones(N, np.int32), np.ones(N, np.int32)

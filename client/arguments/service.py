@@ -79,7 +79,7 @@ def add(verbs: Any) -> None:
 
     bench = verbs.add_parser("bench", help="measure ciris, and Drake beside it if asked; see ciris bench BENCHMARK --help")
     kinds = ["pairs", "scene", "growth", "path", "agreement", "scaling", "service", "store", "survey", "robots", "arms", "query", "plan"]
-    bench.add_argument("benchmark", choices=[*kinds, "cover", "map", "recertify", "fleet", "docs"], help="what to measure")
+    bench.add_argument("benchmark", choices=[*kinds, "cover", "map", "lookups", "recertify", "fleet", "docs"], help="what to measure")
     bench.add_argument("arguments", nargs=argparse.REMAINDER, metavar="...", help="the benchmark's own arguments")
     bench.set_defaults(run="client.bench:bench")
 

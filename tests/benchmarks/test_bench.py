@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
-from benchmarks import agreement, catalogue, compare, growth, maps, path, plan, query, recertify, report, service, store, survey
+from benchmarks import agreement, catalogue, compare, growth, lookups, maps, path, plan, query, recertify, report, service, store, survey
 from benchmarks.compare import Verdict, verdict
 from benchmarks.ompl import Ompl
 from certifier.carry.robot import same_bodies
@@ -270,6 +270,14 @@ def test_a_map_is_measured_with_what_it_connects(monkeypatch: pytest.MonkeyPatch
     assert [at for at, _ in row["over_time"]] == sorted(at for at, _ in row["over_time"])
     assert 0 < row["straight"] < row["connected"] < 1
     assert "planar_2dof" in report.text(document)
+
+
+def test_lookups_are_measured_in_as_many_cells_as_are_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lookups, "COVERED", 0.5)
+    (row,) = lookups.lookups(["planar_2dof"], 5000, 60.0, lambda _: None)["rows"]
+    assert row["grown"] < 5000 <= row["cells"] < 5500
+    assert all(0 < row[what]["p50"] <= row[what]["p99"] <= row[what]["most"] for what in ("point", "batch", "motion"))
+    assert "1000 points, p99" in report.text({"benchmark": "lookups", "rows": [row]})
 
 
 @pytest.mark.slow

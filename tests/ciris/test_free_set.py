@@ -16,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ciris.free_set
+from benchmarks.lookups import enlarged
 from certifier.errors import CirisError, RegionError
 from certifier.map import free_set
 from certifier.proof import limits
@@ -104,6 +105,59 @@ def test_it_says_what_exact_fractions_say(tmp_path_factory, drawn, motions) -> N
         x, dx = ([Fraction(v) for v in vector.tolist()] for vector in (a, b - a))
         for part in proved.tolist():
             assert free_along(cells, *([v + Fraction(t) * dv for v, dv in zip(x, dx, strict=True)] for t in part))
+
+
+def boxes_of(free_set: dict[str, Any], lower: np.ndarray, upper: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """The boxes of the leaves of each tree, (L, n) twice, and which of them are proved."""
+    joint, cut, parts = free_set["joint"], free_set["cut"], free_set["upper"]
+    found = []
+    for root in free_set["root"]:
+        lows, highs, proved, waiting = [], [], [], [(root, lower, upper)]
+        while waiting:
+            node, low, high = waiting.pop()
+            if joint[node] < 0:
+                lows.append(low)
+                highs.append(high)
+                proved.append(joint[node] == PROVED)
+                continue
+            below, above = high.copy(), low.copy()
+            below[joint[node]] = above[joint[node]] = cut[node]
+            waiting += [(node + 1, low, below), (parts[node], above, high)]
+        found.append((np.array(lows), np.array(highs), np.array(proved)))
+    return found
+
+
+def test_thousands_of_cells_say_what_all_of_their_boxes_say(tmp_path: Path) -> None:
+    first, second = (0, 0.3, (1, -0.2, OPEN, PROVED), (2, 0.1, OPEN, OPEN)), (2, 0.6, OPEN, (0, 0.9, PROVED, OPEN))
+    with np.load(written(tmp_path / "small.npz", [[first, second], [(1, 1.0, PROVED, (0, 0.2, OPEN, PROVED))]])) as arrays:
+        large = enlarged(dict(arrays), 20_000)
+    assert 20_000 <= (large["joint"] == PROVED).sum() < 21_000
+    found = FreeSet.of_bytes(free_set.as_file(large), "large")
+    rng, limits = np.random.default_rng(0), np.full(N, LIMIT)
+    trees = boxes_of(large, -limits, limits)
+    assert all(np.prod(high - low, axis=1).sum() == pytest.approx((2 * LIMIT) ** N) for low, high, _ in trees)
+
+    def proved(tree: int, q: np.ndarray) -> np.ndarray:
+        low, high, holds = trees[tree]
+        return np.array([holds[(low <= x).all(axis=1) & (x <= high).all(axis=1)].all() for x in q])
+
+    low, high, _ = trees[2]
+    q = (low + (high - low) * rng.random(low.shape))[rng.permutation(len(low))[:600]]
+    expected = (proved(0, q) | proved(1, q)) & proved(2, q)
+    assert 100 < expected.sum() < 500
+    assert found.contains(q).tolist() == [bool(found.contains(x)) for x in q] == expected.tolist()
+
+    starts = q[expected]
+    ends = np.clip(starts + 0.01 * rng.normal(size=starts.shape), -LIMIT, LIMIT)
+    free = found.contains_motion(starts, ends)
+    assert 0 < free.sum() < len(free)
+    for a, b, holds in zip(starts[:100], ends[:100], free[:100].tolist(), strict=True):
+        on_way = a + np.linspace(0, 1, 200)[:, None] * (b - a)
+        apart = (proved(0, on_way) | proved(1, on_way)) & proved(2, on_way)
+        assert not holds or apart.all()
+        for begin, end in found.proved_parts(a, b):
+            between = a + np.linspace(begin, end, 20)[:, None] * (b - a)
+            assert ((proved(0, between) | proved(1, between)) & proved(2, between)).all()
 
 
 def test_open_parts_say_where_and_between_which_bodies(tmp_path: Path) -> None:
