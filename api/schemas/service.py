@@ -101,3 +101,8 @@ class Project(BaseModel):
     bytes: int = Field(description="Bytes of scenes, jobs, proofs and cells that the project stores, as of some seconds ago.")
     max_bytes: int | None = Field(description="The service refuses new scenes and jobs once this many bytes are stored; null for no limit.")
     keep_days: float | None = Field(description="Days after a job's end when its data is deleted, except its regions; null for never.")
+    solver_seconds: float = Field(description="Seconds in which solvers have worked for the project since the calendar month (UTC) began.")
+    max_solver_seconds: float | None = Field(
+        description="The service refuses new jobs once solvers have worked for the project this many seconds in a month; null for no limit."
+    )
+    month_ends_at: datetime = Field(description="When the next month begins, and `solver_seconds` is 0 again.")

@@ -222,7 +222,7 @@ class AsyncClient:
         await self._send("DELETE", f"/v1/{path}", params={"dependents": "delete" if dependents else "keep"})
 
     async def project(self) -> Document:
-        """Returns the project of the key: how much it stores, and its limits."""
+        """Returns the project of the key: how much it stores, how long solvers worked for it this month, and its limits."""
         return await self._json("GET", "/v1/project")
 
     async def keys(self) -> list[Document]:

@@ -221,7 +221,7 @@ class Client:
         self._send("DELETE", f"/v1/{path}", params={"dependents": "delete" if dependents else "keep"})
 
     def project(self) -> Document:
-        """Returns the project of the key: how much it stores, and its limits."""
+        """Returns the project of the key: how much it stores, how long solvers worked for it this month, and its limits."""
         return self._json("GET", "/v1/project")
 
     def keys(self) -> list[Document]:

@@ -70,7 +70,7 @@ SELDOM: dict[str, dict[str, Any]] = {
         },
         "uncovered": {"time": 0.625, "segment": 0, "q": [0.4, 0.3], "s": [0.2, 0.15], "next": None},
     },
-    "Project": {"max_bytes": 50_000_000_000, "keep_days": 30},
+    "Project": {"max_bytes": 50_000_000_000, "keep_days": 30, "max_solver_seconds": 720_000},
     "Promoted": {"scene": "2138b0193bfdd632", "regions": 3, "before": "0f8a6f0c2b7e11aa", "regions_before": 4},
     "ScenePage": {"next": "MjAyNi0wNS0wMVQwODowMDowMCswMDowMCA1ZDBj"},
     "Verification": {"error": {"code": "bad_proof", "message": "a plane does not separate its pair", "field": None, "hint": ""}},

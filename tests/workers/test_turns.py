@@ -14,8 +14,8 @@ from sqlalchemy.exc import OperationalError
 from certifier.errors import CirisError
 from certifier.outcome import Outcome
 from certifier.pair.forecast import forecast
-from db import jobs, leases, pairs, projects, regions, retention, steps, transaction, workers
-from db.models import JobRow, PairRow, ProofRow, StepRow
+from db import jobs, leases, pairs, projects, regions, retention, solver_time, steps, transaction, workers
+from db.models import DEFAULT_PROJECT, JobRow, PairRow, ProofRow, StepRow
 from db.session import database
 from db.settings import settings
 from db.states import WorkerState
@@ -50,6 +50,16 @@ def test_work_is_done_once(job_id: str) -> None:
     with environment(CIRIS_BATCH_SECONDS="1e-9"):
         assert work_all() == [Piece(job_id, False), Piece(job_id, False), Piece(job_id, True)]
     assert [(row.state, row.attempts) for row in pairs_of(job_id)] == [("certified", 1)] * 3
+
+
+def test_what_solvers_do_for_a_job_counts_for_its_project(job_id: str) -> None:
+    while work_all():
+        coordinate(job_id)
+    with database().read() as session:
+        accepting = sum(step.seconds or 0.0 for step in steps.of_job(session, job_id))
+        spent = (pairs.seconds(session, job_id), accepting, solver_time.used(session, DEFAULT_PROJECT))
+    assert min(spent) > 0
+    assert spent[2] == pytest.approx(spent[0] + spent[1])
 
 
 def of_another_project(job_id: str) -> None:
