@@ -140,6 +140,9 @@ class ApiKeyRow(Owned, Base):
     """A value of db.keys.Scope."""
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
     revoked_at: Mapped[datetime | None]
+    """From this time on it is refused. It may be in the future, where the key was made to expire."""
+    last_used_at: Mapped[datetime | None]
+    """A little before its last use (db.keys.NOTED)."""
 
 
 class AuditRow(Owned, Base):

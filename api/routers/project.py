@@ -54,8 +54,8 @@ def create_key(body: NewKey, caller: Admin, db: Db) -> MadeKey:
                 field="name",
                 hint="make it at the service's machine: `ciris key add`",
             )
-        key = keys.add(session, body.name, body.scope, caller.project)
-        audit.note(session, caller.project, str(caller), Action.KEY_MADE, f"{body.name} ({body.scope})")
+        key = keys.add(session, body.name, body.scope, caller.project, body.days)
+        audit.note(session, caller.project, str(caller), Action.KEY_MADE, keys.made(body.name, body.scope, body.days))
     return MadeKey(name=body.name, scope=body.scope, key=key)
 
 

@@ -228,9 +228,9 @@ class Client:
         """Returns the keys of the project, newest first, without what is secret."""
         return self._all("keys")
 
-    def add_key(self, name: str, scope: str) -> Document:
-        """Makes a key of the project. The answer is the only one that shows it."""
-        return self._json("POST", "/v1/keys", json={"name": name, "scope": scope})
+    def add_key(self, name: str, scope: str, days: float | None = None) -> Document:
+        """Makes a key of the project, which expires after this many days, or never. The answer is the only one that shows it."""
+        return self._json("POST", "/v1/keys", json={"name": name, "scope": scope, "days": days})
 
     def revoke_key(self, name: str) -> None:
         """Revokes the project's key of this name."""

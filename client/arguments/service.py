@@ -77,8 +77,9 @@ def add(verbs: Any) -> None:
     made.add_argument(
         "--scope", choices=["read", "submit", "admin"], required=True, help="what the key allows; each scope includes those before it"
     )
+    made.add_argument("--days", type=float, metavar="N", help="the key expires after N days; default: never")
     made.set_defaults(run="client.keys:add")
-    listed = key.add_parser("ls", parents=[database, over_http, as_json()], help="list the keys, without their secrets")
+    listed = key.add_parser("ls", parents=[database, over_http, as_json()], help="list the keys, when each was last used, and no secrets")
     listed.set_defaults(run="client.keys:ls")
     revoked = key.add_parser(
         "revoke", parents=[database, over_http, of_project], help="revoke a key; the service refuses it within a second"

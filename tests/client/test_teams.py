@@ -6,6 +6,7 @@ import json
 import subprocess
 import time
 from contextlib import closing
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from db import audit, keys, migrate, projects, solver_time
 from db.keys import Scope
 from db.session import Database
 from db.settings import Settings
+from db.types import utcnow
 from tests.client.conftest import Ciris, command, surroundings
 
 
@@ -42,7 +44,13 @@ def test_an_admin_manages_the_keys_of_the_project_over_http(ciris: Ciris, url: s
     assert ciris("job", "ls", "--json", CIRIS_URL=url, CIRIS_API_KEY=key).json == []
     listed = ciris("key", "ls", "--url", url, "--json", CIRIS_API_KEY=admin)
     assert [(one["name"], one["scope"]) for one in listed.json] == [("planner", "read"), ("boss", "admin")]
-    assert "planner" in ciris("key", "ls", "--url", url, CIRIS_API_KEY=admin).stdout
+    table = ciris("key", "ls", "--url", url, CIRIS_API_KEY=admin).stdout
+    assert ("planner" in table, "last used" in table) == (True, True)
+    assert ciris("key", "add", "visitor", "--scope", "read", "--days", "90", "--url", url, CIRIS_API_KEY=admin).status == 0
+    visitor, planner, boss = ciris("key", "ls", "--url", url, "--json", CIRIS_API_KEY=admin).json
+    in_90_days = (utcnow() + timedelta(days=90)).date().isoformat()
+    assert (visitor["expires_at"][:10], planner["expires_at"], boss["revoked_at"]) == (in_90_days, None, None)
+    assert (visitor["last_used_at"], boss["last_used_at"][:4]) == (None, str(utcnow().year))
     assert ciris("key", "add", "x", "--scope", "admin", "--url", url, CIRIS_API_KEY=key).status == 2
     assert ciris("key", "revoke", "planner", "--url", url, CIRIS_API_KEY=admin).status == 0
     time.sleep(KEYS_SECONDS)

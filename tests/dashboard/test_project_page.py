@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from datetime import timedelta
 from typing import Any
 
 from fastapi.testclient import TestClient
@@ -11,6 +12,7 @@ from api.access import KEYS_SECONDS
 from db import keys, projects, solver_time
 from db.keys import Scope
 from db.session import Database
+from db.types import utcnow
 
 
 def made(database: Database, *wanted: tuple[str, Scope, str]) -> list[str]:
@@ -50,6 +52,14 @@ def test_an_admin_makes_and_revokes_keys_and_sees_who_did(
     assert "key revoked" in log
     assert "planner (submit)" in log
     assert "theirs" not in page.text_content("main"), "another project's key"
+    page.get_by_label("Name").fill("visitor")
+    page.get_by_label("For days").fill("90")
+    page.get_by_role("button", name="Make the key").click()
+    page.get_by_role("row").filter(has_text="visitor (read, for 90 days)").wait_for()
+    visitor = page.get_by_role("region", name="Keys").get_by_role("row").filter(has_text="visitor").locator("td")
+    expires = (utcnow() + timedelta(days=90)).date().isoformat()
+    assert visitor.nth(4).locator("time").count() == 0, "it was not used"
+    assert visitor.nth(5).locator("time").get_attribute("datetime")[:10] == expires
     page.get_by_label("Name").fill("boss")
     page.get_by_role("button", name="Make the key").click()
     page.locator("#made-key.bad").wait_for()
