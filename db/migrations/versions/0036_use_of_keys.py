@@ -1,6 +1,7 @@
 """The time at which a key was last used is kept, and a key may end at a time that is set when it is made
 
-Revision: 0036, follows 0035. Until that time, ``revoked_at`` of the key is in the future.
+Revision: 0036, follows 0035. Until that time, ``revoked_at`` of the key is in the future. Programs of before take such a key for
+a revoked one.
 """
 
 from __future__ import annotations
