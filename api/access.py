@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 import time
 from collections.abc import Awaitable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import datetime
 from typing import Annotated
 
 from cachetools import LRUCache
@@ -22,6 +24,9 @@ from db import keys, version
 from db.keys import Key, Scope
 from db.models import DEFAULT_PROJECT
 from db.session import UNAVAILABLE, Database
+from db.types import utcnow
+
+log = logging.getLogger(__name__)
 
 COOKIE = "ciris_key"
 KEYS_SECONDS = 1.0
@@ -32,8 +37,12 @@ AGAIN_SECONDS = 0.1
 """When requests bring unknown keys, the database is read at most once in this many seconds, however many requests there are."""
 MOST_KEYS = 10_000
 """This many keys are remembered. The one that was not used for longest is looked up again when it comes."""
+NOTES_SECONDS = 5.0
+"""When it could not be noted that keys were used, this is tried again after so many seconds."""
 _thread = ThreadPoolExecutor(1, "keys")
 """Every request may wait for the keys, so their reading waits for no other request."""
+_notes = ThreadPoolExecutor(1, "uses of keys")
+"""Nobody waits for these notes, which may wait for the database's lock."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +73,8 @@ class Keyring:
     again, all at once. So a revoked key is refused after ``KEYS_SECONDS`` at the latest, and a key that is in use never waits for a
     reading while the database answers. What strangers send is not stored, and makes the keyring read at most once in ``AGAIN_SECONDS``.
 
+    It has the use of a key noted, about every ten minutes while the key is in use (``db.keys.NOTED``). No request waits for that.
+
     It does not read a database of another version: ``database_version`` refuses every caller until the database is of this one.
     """
 
@@ -76,6 +87,9 @@ class Keyring:
         """The ids that the next reading is to look up."""
         self._read_at = -math.inf
         self._reading: asyncio.Future[None] | None = None
+        self._used: set[str] = set()
+        """The ids of keys whose use is to be noted."""
+        self._noting: asyncio.Future[None] | None = None
 
     async def caller(self, given: str | None, *, patient: bool = True) -> Caller | None:
         """Returns the caller to whom the key of a request belongs; None when what is known now does not let this caller in.
@@ -90,7 +104,11 @@ class Keyring:
             return Caller(Scope.ADMIN) if await self._is_open(patient) else None
         id = keys.id_of(given)
         key = None if id is None else await self._key(id, patient)
-        return _caller(key) if key is not None and key.opens(given) else None
+        if key is None or not key.opens(given):
+            return None
+        if not key.used_lately():
+            self._note_soon(key.id)
+        return Caller(key.scope, key.project, key.id, key.name)
 
     async def newcomer(self, given: str | None) -> Caller | None:
         """Returns the caller of a key that :meth:`caller` does not know, because nobody has used it here; else None."""
@@ -153,6 +171,33 @@ class Keyring:
         finally:
             self._reading = None
 
+    def _note_soon(self, id: str) -> None:
+        """Has a key's use noted."""
+        self._used.add(id)
+        if self._noting is None:
+            self._noting = asyncio.ensure_future(self._note_uses())
+
+    async def _note_uses(self) -> None:
+        """Notes which keys were used, until nothing is to be noted."""
+        try:
+            while self._used:
+                ids, self._used, now = self._used, set(), utcnow()
+                try:
+                    await asyncio.get_running_loop().run_in_executor(_notes, self._note, ids, now)
+                except (CirisError, *UNAVAILABLE) as error:
+                    log.warning("when keys were used could not be noted; trying again at their next use: %s", error)
+                    await asyncio.sleep(NOTES_SECONDS)
+                    continue
+                for id in ids & self._known.keys():
+                    known = self._known[id]
+                    self._known[id] = replace(known, key=replace(known.key, last_used_at=now))
+        finally:
+            self._noting = None
+
+    def _note(self, ids: set[str], now: datetime) -> None:
+        with self._database.write() as session:
+            keys.note_use(session, ids, now)
+
     def _look_up(self, ids: set[str]) -> tuple[dict[str, Key], bool]:
         """Returns the keys that have these ids, by id, and whether the service is open."""
         with self._database.read() as session:
@@ -169,10 +214,6 @@ async def _done(reading: Awaitable[None], patient: bool) -> bool:
             raise
         return False
     return True
-
-
-def _caller(key: Key) -> Caller:
-    return Caller(key.scope, key.project, key.id, key.name)
 
 
 def presented_key(headers: Headers) -> str | None:

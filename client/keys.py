@@ -18,9 +18,10 @@ DATABASES = ("CIRIS_DATABASE_URL", "CIRIS_DATA_DIR")
 
 def add(args: Namespace) -> int:
     if args.url is None:
-        return _here(args, ["add", args.name, f"--scope={args.scope}", *_project(args)])
+        days = [] if args.days is None else [f"--days={args.days}"]
+        return _here(args, ["add", args.name, f"--scope={args.scope}", *days, *_project(args)])
     with _there(args) as client:
-        print(client.add_key(args.name, args.scope)["key"])
+        print(client.add_key(args.name, args.scope, args.days)["key"])
     return OK
 
 
@@ -32,8 +33,9 @@ def ls(args: Namespace) -> int:
     if args.json:
         output.print_json(keys)
     else:
-        rows = [(key["name"], key["scope"], key["id"], key["created_at"][:19], (key["revoked_at"] or "")[:19]) for key in keys]
-        output.print_table(("name", "scope", "id", "created", "revoked"), rows)
+        times = ("created_at", "last_used_at", "expires_at", "revoked_at")
+        rows = [(key["name"], key["scope"], key["id"], *((key[time] or "")[:19] for time in times)) for key in keys]
+        output.print_table(("name", "scope", "id", "created", "last used", "expires", "revoked"), rows)
     return OK
 
 

@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session, aliased
 
 from certifier.errors import CirisError
 from certifier.outcome import Outcome
-from db import clock, events, labels, leases, pages, traces, webhooks
+from db import clock, events, labels, leases, pages, solver_time, traces, webhooks
 from db.ids import found
 from db.models import GrowthRow, JobRow, SceneRow, StepRow
 from db.pages import Page
@@ -51,7 +51,8 @@ def create(
 
     Raises:
         CirisError: scene_not_found, when the scene was deleted a moment ago; idempotency_conflict, when the key was used for a
-            different request; quota_exceeded, when the project or the API key has as many unfinished jobs as it may.
+            different request; quota_exceeded, when the project or the API key has as many unfinished jobs as it may; time_quota, when
+            solvers have worked for the project as long as they may this month.
     """
     job_id, project = str(uuid4()), _project_of(session, scene_id)
     now = clock.now(session)
@@ -77,6 +78,7 @@ def create(
     if insert_new(session, JobRow, [new]):
         if parent_id is None:
             _check_quota(session, project, key_id)
+            solver_time.check(session, project)
         job = lock(session, job_id)
         labels.put(session, job_id, given_labels or {})
         events.emit(session, job, "job", {"state": job.state})

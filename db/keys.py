@@ -1,5 +1,7 @@
 """This module makes and revokes API keys. ``ciris key`` runs it as ``python -m db.keys``.
 
+A key ends when somebody revokes it, or at a time that is set when it is made. Both are ``revoked_at``, which is then in the future first.
+
 A key is ``ciris_<id>_<secret>`` with 256 random bits of secret. Nobody can guess it, so a fast hash of it is safe to store. A key is
 looked up by its id, so that others' keys cost nothing however many there are.
 """
@@ -36,6 +38,10 @@ COUNTED_DAYS = 1
 """A revoked key counts against the limit of its project for this many days, so that making and revoking keys in turn has a limit too."""
 KEPT_DAYS = 30
 """A revoked key is listed for this many days. Then the service forgets it."""
+NOTED = timedelta(minutes=10)
+"""The use of a key is noted again once this much time has passed, so that hardly any request writes."""
+MOST_DAYS = 3650
+"""A key may be made to expire after this many days at most."""
 LISTED = 1000
 """At most this many names of keys are offered where one is chosen."""
 KEYS_TOGETHER, JOBS_TOGETHER = 100, 1000
@@ -59,8 +65,11 @@ class Scope(StrEnum):
         return order.index(self) >= order.index(other)
 
 
-def add(session: Session, name: str, scope: Scope, project: str = DEFAULT_PROJECT) -> str:
+def add(session: Session, name: str, scope: Scope, project: str = DEFAULT_PROJECT, days: float | None = None) -> str:
     """Makes a key of a project and returns it. Only this call ever shows it.
+
+    Args:
+        days: the key is refused after this many days; None for never.
 
     Raises:
         CirisError: project_not_found; key_name, for a name that cannot be used or that another key of the project has; too_many_keys.
@@ -73,7 +82,8 @@ def add(session: Session, name: str, scope: Scope, project: str = DEFAULT_PROJEC
     _check_limit(session, project)
     key_id = secrets.token_hex(6)
     key = f"ciris_{key_id}_{secrets.token_urlsafe(32)}"
-    session.add(ApiKeyRow(id=key_id, project=project, name=name, digest=_digest(key), scope=scope))
+    expires_at = None if days is None else utcnow() + timedelta(days=days)
+    session.add(ApiKeyRow(id=key_id, project=project, name=name, digest=_digest(key), scope=scope, revoked_at=expires_at))
     return key
 
 
@@ -112,18 +122,23 @@ def exist(session: Session) -> bool:
 
 @dataclass(frozen=True)
 class Key:
-    """Describes a key that was made; ``digest`` is its SHA-256."""
+    """Describes a key that was made; ``digest`` is its SHA-256, and from ``revoked_at`` on it is refused."""
 
     id: str
     project: str
     name: str
     digest: str
     scope: Scope
-    revoked: bool
+    revoked_at: datetime | None
+    last_used_at: datetime | None
 
     def opens(self, given: str) -> bool:
         """Says whether what a caller sent is this key, and may be used."""
-        return not self.revoked and hmac.compare_digest(self.digest, _digest(given))
+        return (self.revoked_at is None or utcnow() < self.revoked_at) and hmac.compare_digest(self.digest, _digest(given))
+
+    def used_lately(self) -> bool:
+        """Says whether its use need not be noted again yet."""
+        return self.last_used_at is not None and utcnow() - self.last_used_at < NOTED
 
 
 def id_of(given: str) -> str | None:
@@ -134,9 +149,15 @@ def id_of(given: str) -> str | None:
 
 def find(session: Session, ids: Collection[str]) -> dict[str, Key]:
     """Returns id -> key for those of these ids that a key has, a revoked one too."""
-    columns = (ApiKeyRow.id, ApiKeyRow.project, ApiKeyRow.name, ApiKeyRow.digest, ApiKeyRow.scope, ApiKeyRow.revoked_at.is_not(None))
-    rows = session.execute(select(*columns).where(ApiKeyRow.id.in_(ids)))
-    return {id: Key(id, project, name, digest, Scope(scope), revoked) for id, project, name, digest, scope, revoked in rows}
+    who = (ApiKeyRow.id, ApiKeyRow.project, ApiKeyRow.name, ApiKeyRow.digest, ApiKeyRow.scope)
+    rows = session.execute(select(*who, ApiKeyRow.revoked_at, ApiKeyRow.last_used_at).where(ApiKeyRow.id.in_(ids)))
+    return {id: Key(id, project, name, digest, Scope(scope), *times) for id, project, name, digest, scope, *times in rows}
+
+
+def note_use(session: Session, ids: Collection[str], now: datetime) -> None:
+    """Notes that these keys were used now, where that was not noted lately."""
+    due = or_(ApiKeyRow.last_used_at.is_(None), ApiKeyRow.last_used_at <= now - NOTED)
+    session.execute(update(ApiKeyRow).where(ApiKeyRow.id.in_(ids), due).values(last_used_at=now))
 
 
 def check(session: Session, given: str) -> Key | None:
@@ -147,9 +168,9 @@ def check(session: Session, given: str) -> Key | None:
 
 
 def forgettable(session: Session, now: datetime) -> Sequence[str]:
-    """Returns the ids of some keys that were revoked ``KEPT_DAYS`` ago and have no job under way.
+    """Returns the ids of some keys that ended ``KEPT_DAYS`` ago and have no job under way.
 
-    The key that was revoked last is never among them: a service that has forgotten its last key would be open.
+    The key that ended last is never among them: a service that has forgotten its last key would be open.
     """
     last = select(func.max(ApiKeyRow.revoked_at)).scalar_subquery()
     at_work = exists().where(JobRow.key_id == ApiKeyRow.id, JobRow.state.in_(unfinished(JOB)))
@@ -206,11 +227,11 @@ def named(session: Session, name: str) -> str:
 
 def _active(session: Session, name: str, project: str) -> Sequence[ApiKeyRow]:
     mine = (ApiKeyRow.project == project, ApiKeyRow.name == name)
-    return session.scalars(select(ApiKeyRow).where(*mine, ApiKeyRow.revoked_at.is_(None))).all()
+    return session.scalars(select(ApiKeyRow).where(*mine, or_(ApiKeyRow.revoked_at.is_(None), ApiKeyRow.revoked_at > utcnow()))).all()
 
 
 def _check_limit(session: Session, project: str) -> None:
-    """Refuses another key of a project that has as many as it may. Those revoked lately count."""
+    """Refuses another key of a project that has as many as it may. Those that ended lately count."""
     limit = settings().max_keys_per_project
     counts = or_(ApiKeyRow.revoked_at.is_(None), ApiKeyRow.revoked_at > utcnow() - timedelta(days=COUNTED_DAYS))
     if len(session.scalars(select(ApiKeyRow.id).where(ApiKeyRow.project == project, counts).limit(limit)).all()) >= limit:
@@ -234,6 +255,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     adding = verbs.add_parser("add", help="make a key and print it, once")
     adding.add_argument("name")
     adding.add_argument("--scope", type=Scope, choices=list(Scope), required=True)
+    adding.add_argument("--days", type=_days, help="the key expires after this many days; default: never")
     verbs.add_parser("ls", help="list the keys, without what is secret").add_argument("--json", action="store_true")
     revoking = verbs.add_parser("revoke", help="end a key within a second")
     revoking.add_argument("name")
@@ -250,8 +272,8 @@ def _run(session: Session, given: argparse.Namespace) -> list[str]:
     """Does what the user asked, and returns the lines to print once it is committed."""
     match given.verb:
         case "add":
-            key = add(session, given.name, given.scope, given.project)
-            audit.note(session, given.project, COMMAND_LINE, Action.KEY_MADE, f"{given.name} ({given.scope})")
+            key = add(session, given.name, given.scope, given.project, given.days)
+            audit.note(session, given.project, COMMAND_LINE, Action.KEY_MADE, made(given.name, given.scope, given.days))
             return [key]
         case "revoke":
             revoke(session, given.name, given.project)
@@ -261,18 +283,32 @@ def _run(session: Session, given: argparse.Namespace) -> list[str]:
             return command_line.listed([_described(row) for row in newest(session)], as_json=given.json)
 
 
+def made(name: str, scope: Scope, days: float | None) -> str:
+    """Returns what the audit log says of a new key."""
+    return f"{name} ({scope})" if days is None else f"{name} ({scope}, for {days:g} days)"
+
+
+def ends(row: ApiKeyRow) -> tuple[datetime | None, datetime | None]:
+    """Returns when a key will expire and when it ended, of which one at most is known."""
+    return (row.revoked_at, None) if row.revoked_at is not None and row.revoked_at > utcnow() else (None, row.revoked_at)
+
+
+def _days(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.0
+    if not 0 < number <= MOST_DAYS:
+        raise argparse.ArgumentTypeError(f"{text} is not a number of days above 0, of at most {MOST_DAYS}")
+    return number
+
+
 def _described(row: ApiKeyRow) -> dict[str, str | None]:
     """Returns what may be shown of a key."""
-    created_at = row.created_at.isoformat(timespec="seconds")
-    revoked_at = None if row.revoked_at is None else row.revoked_at.isoformat(timespec="seconds")
-    return {
-        "name": row.name,
-        "scope": row.scope,
-        "project": row.project,
-        "id": row.id,
-        "created_at": created_at,
-        "revoked_at": revoked_at,
-    }
+    expires_at, revoked_at = ends(row)
+    times = {"created_at": row.created_at, "last_used_at": row.last_used_at, "expires_at": expires_at, "revoked_at": revoked_at}
+    said = {name: None if at is None else at.isoformat(timespec="seconds") for name, at in times.items()}
+    return {"name": row.name, "scope": row.scope, "project": row.project, "id": row.id, **said}
 
 
 if __name__ == "__main__":

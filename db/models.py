@@ -46,6 +46,8 @@ class ProjectRow(Base):
     """Largest number of bytes that it may store; None for any number."""
     keep_days: Mapped[float | None]
     """Jobs without a region are deleted this many days after their end; None where they stay."""
+    max_solver_seconds: Mapped[float | None]
+    """No new job is taken in a calendar month in which solvers have worked for it this long; None for any time."""
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
 
 
@@ -55,6 +57,17 @@ class Owned:
     @declared_attr
     def project(cls) -> Mapped[str]:
         return mapped_column(String(64), ForeignKey("projects.name"), default=DEFAULT_PROJECT)
+
+
+class SolverTimeRow(Owned, Base):
+    """This row counts how long solvers have worked for a project in a calendar month."""
+
+    __tablename__ = "solver_time"
+
+    project: Mapped[str] = mapped_column(String(64), ForeignKey("projects.name"), primary_key=True)
+    month: Mapped[str] = mapped_column(String(7), primary_key=True)
+    """In UTC, as 2026-11."""
+    seconds: Mapped[float]
 
 
 class SceneRow(Owned, Base):
@@ -127,6 +140,9 @@ class ApiKeyRow(Owned, Base):
     """A value of db.keys.Scope."""
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
     revoked_at: Mapped[datetime | None]
+    """From this time on it is refused. It may be in the future, where the key was made to expire."""
+    last_used_at: Mapped[datetime | None]
+    """A little before its last use (db.keys.NOTED)."""
 
 
 class AuditRow(Owned, Base):

@@ -21,7 +21,7 @@ from certifier import stored
 from certifier.conditions import condition_named
 from certifier.outcome import Outcome, combine
 from certifier.pair.result import PairResult
-from db import events, jobs, leases, proofs, subtrees
+from db import events, jobs, leases, proofs, solver_time, subtrees
 from db.models import IterationRow, JobRow, PairRow
 from db.session import without_sorting
 from db.states import PAIR, IterationState, PairState, transition, transition_each, unfinished
@@ -220,6 +220,7 @@ def save(session: Session, claim: Claim, results: Mapping[tuple[int, int], PairR
         skip(session, job, PairRow.iteration == claim.iteration, PairRow.id > last)
         rest = [pair for pair in rest if pair <= last]
     finished = job.open_pairs == job.running_pairs == 0 and _finish_iteration(session, job, claim.iteration)
+    solver_time.add(session, job.project, sum(result.seconds for result in saved.values()))
     return Saved(bool(rest), finished)
 
 

@@ -15,7 +15,7 @@ from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from db import audit, command_line
+from db import audit, command_line, solver_time
 from db.audit import COMMAND_LINE, Action
 from db.models import ProjectRow
 from db.session import insert_new
@@ -23,6 +23,7 @@ from db.session import insert_new
 NAME = re.compile(r"\w[\w.@-]{0,63}")
 """Projects and keys have such names."""
 MOST_BYTES = 2**62
+MOST_SECONDS = 10**12
 MOST_DAYS = 36_500
 """A project keeps things for at most this many days. An earlier version took more: then nothing expires."""
 
@@ -82,6 +83,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     setting.add_argument(
         "--keep-days", type=partial(_limit, most=MOST_DAYS), help="jobs without a region are deleted this many days after their end"
     )
+    setting.add_argument(
+        "--max-solver-seconds",
+        type=partial(_limit, most=MOST_SECONDS),
+        help="no new job is taken in a month in which solvers have worked for the project this long",
+    )
     given = parser.parse_args(arguments)
     for line in command_line.on_database(given.data, partial(_run, given=given)):
         print(line)
@@ -119,17 +125,24 @@ def _run(session: Session, given: argparse.Namespace) -> list[str]:
                 row.max_bytes = given.max_bytes or None
             if given.keep_days is not None:
                 row.keep_days = given.keep_days or None
-            audit.note(session, row.name, COMMAND_LINE, Action.LIMITS_SET, f"max_bytes {row.max_bytes}, keep_days {row.keep_days}")
-            return command_line.listed([_described(row)], as_json=False)
+            if given.max_solver_seconds is not None:
+                row.max_solver_seconds = given.max_solver_seconds or None
+            limits = ", ".join(f"{name} {value}" for name, value in _limits(row).items())
+            audit.note(session, row.name, COMMAND_LINE, Action.LIMITS_SET, limits)
+            return command_line.listed([_described(session, row)], as_json=False)
         case _:
-            return command_line.listed([_described(row) for row in all_of(session)], as_json=given.json)
+            return command_line.listed([_described(session, row) for row in all_of(session)], as_json=given.json)
 
 
-def _described(row: ProjectRow) -> dict[str, Any]:
+def _limits(row: ProjectRow) -> dict[str, float | None]:
+    return {"max_bytes": row.max_bytes, "keep_days": row.keep_days, "max_solver_seconds": row.max_solver_seconds}
+
+
+def _described(session: Session, row: ProjectRow) -> dict[str, Any]:
     return {
         "name": row.name,
-        "max_bytes": row.max_bytes,
-        "keep_days": row.keep_days,
+        **_limits(row),
+        "solver_seconds": round(solver_time.used(session, row.name), 1),
         "created_at": row.created_at.isoformat(timespec="seconds"),
     }
 

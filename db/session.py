@@ -215,9 +215,14 @@ def insert_new(session: Session, model: type[DeclarativeBase], rows: list[dict[s
     """Inserts rows, except those that exist already by a unique constraint. Returns how many it inserted."""
     if not rows:
         return 0
-    dialect = {"sqlite": sqlite, "postgresql": postgresql}[session.get_bind().dialect.name]
-    insert = dialect.insert(model).on_conflict_do_nothing().returning(*model.__table__.primary_key)
+    insert = inserting(session, model).on_conflict_do_nothing().returning(*model.__table__.primary_key)
     return len(session.execute(insert, rows).all())
+
+
+def inserting(session: Session, model: type[DeclarativeBase]) -> sqlite.Insert | postgresql.Insert:
+    """Returns an insertion that may say what happens with rows that are there already."""
+    dialect = {"sqlite": sqlite, "postgresql": postgresql}[session.get_bind().dialect.name]
+    return dialect.insert(model)
 
 
 @cache

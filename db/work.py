@@ -75,6 +75,14 @@ def others_wait(session: Session, job_id: str) -> bool:
     return bool(others) or any(of_key[project, first.key_id] < of_key[project, key_id] for first in firsts if first.project == project)
 
 
+def newcomer_waits(session: Session, job_id: str) -> bool:
+    """Says whether another job of the same key has work, and no solver has begun it yet."""
+    project, key_id = session.execute(select(JobRow.project, JobRow.key_id).where(JobRow.id == job_id)).one()
+    same = (JobRow.project == project, JobRow.key_id.is_not_distinct_from(key_id), JobRow.id != job_id)
+    query = select(JobRow.id).where(*same, JobRow.claimed_at.is_(None), _has_work()).limit(1)
+    return session.scalar(query, {"now": utcnow()}) is not None
+
+
 def is_there(session: Session) -> bool:
     """Says whether there is work."""
     return session.scalar(_any(), {"now": utcnow()}) is not None
@@ -98,26 +106,30 @@ def claim(session: Session, job_id: str, *, lease_seconds: float, batch_seconds:
 
 
 def to_give_up(session: Session) -> leases.Lost | None:
-    """Returns the lease of a step that its holder is to give up, so that a project gets a solver within seconds; None when there is none.
+    """Returns the lease of a step that its holder is to give up, so that others get a solver within seconds; None when there is none.
 
-    That is when all solvers do steps, whose end nobody knows, and a project for which none works has work. The project that holds most
-    steps, if it holds several, gives up the one that was asked for last. No step is given up twice. Work of other kinds ends within
-    seconds, or gives way by itself.
+    That is when all solvers do steps, whose end nobody knows, and a project for which none works has work, or a job that nobody has begun
+    has pairs, which end within seconds. The project that holds most steps, if it holds several, gives up the one that was asked for last.
+    No step is given up twice. Work of other kinds ends within seconds, or gives way by itself.
     """
     long = (StepRow.state == StepState.RUNNING, StepRow.kind.not_in((LEAD, PIECE)))
     of_project = Counter(session.scalars(select(JobRow.project).join(StepRow, StepRow.job_id == JobRow.id).where(*long)))
     if max(of_project.values(), default=0) < 2 or of_project.total() < workers.solvers(session):
         return None
     firsts = session.execute(_placed(), {"now": utcnow(), "places": 1, "most": MOST_KEYS}).all()
-    waits = any(first.project not in of_project for first in firsts)
-    if not waits or leases.count_of_keys(session).total() > of_project.total():
+    reason = None
+    if any(first.project not in of_project for first in firsts):
+        reason = "another project had no solver"
+    elif session.scalar(_newcomer_with_pairs()) is not None:
+        reason = "a job that no solver had begun waited with pairs"
+    if reason is None or leases.count_of_keys(session).total() > of_project.total():
         return None
     ((project, _),) = of_project.most_common(1)
     of_it = select(StepRow).join(JobRow, JobRow.id == StepRow.job_id).where(*long, JobRow.project == project, StepRow.attempts == 1)
     step = session.scalar(of_it.order_by(StepRow.id.desc()).limit(1))
     if step is None:
         return None
-    return leases.Lost(step.job_id, step.lease_token or "", step.worker or "", "another project had no solver", alone=False)
+    return leases.Lost(step.job_id, step.lease_token or "", step.worker or "", reason, alone=False)
 
 
 def busy_solvers(session: Session, *, batch_seconds: float) -> int:
@@ -183,6 +195,11 @@ def _placed() -> Select[tuple[str, str, str | None, float, int]]:
 @cache
 def _any() -> Select[str]:
     return select(JobRow.id).where(_has_work()).limit(1)
+
+
+@cache
+def _newcomer_with_pairs() -> Select[str]:
+    return select(JobRow.id).where(JobRow.state == JobState.RUNNING, JobRow.open_pairs > 0, JobRow.claimed_at.is_(None)).limit(1)
 
 
 @cache

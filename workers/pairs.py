@@ -32,7 +32,8 @@ log = logging.getLogger(__name__)
 SAVE_SECONDS = 2.0
 """Results are saved together once this much time has passed since the last saving."""
 HELD_SECONDS = 5.0
-"""The rest of a batch is given back when others wait and this much time has passed since its first pair was done. Forecasts may be far too
+"""The rest of a batch is given back when others wait and this much time has passed since its first pair was done, and for a job that
+nobody has begun after the first saving. Forecasts may be far too
 short. Before the first pair, a process may have to load the scene and the polytope."""
 
 CertifyPair = Callable[[pairs.Claim, pairs.Claimed], PairResult]
@@ -68,7 +69,7 @@ def _certify_and_save(claim: pairs.Claim, certify: CertifyPair) -> bool:
             if saved.finished or not saved.held:
                 return saved.finished
             results, since = {}, time.monotonic()
-            if since - first_done >= HELD_SECONDS and persistently(partial(_give_back, claim)):
+            if persistently(partial(_give_back, claim, since - first_done)):
                 send_work()
                 return False
     return False
@@ -122,10 +123,15 @@ def _left(job_id: str, iteration: int, index: int) -> list[bytes]:
     return persistently(read)
 
 
-def _give_back(claim: pairs.Claim) -> bool:
-    """Gives the rest of a claim back when others wait, and says whether it did."""
+def _give_back(claim: pairs.Claim, held_seconds: float) -> bool:
+    """Gives the rest of a claim back when others wait, and says whether it did.
+
+    Args:
+        held_seconds: seconds since its first pair was done.
+    """
     with database().read() as session:
-        if not work.others_wait(session, claim.job_id):
+        new = work.newcomer_waits(session, claim.job_id)
+        if not new and (held_seconds < HELD_SECONDS or not work.others_wait(session, claim.job_id)):
             return False
     with database().write() as session:
         pairs.give_back(session, claim)

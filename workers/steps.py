@@ -10,7 +10,7 @@ from structlog.contextvars import bound_contextvars
 
 from certifier.errors import CirisError
 from certifier.jobs.growing import REST
-from db import jobs, leases, steps, traces
+from db import jobs, leases, solver_time, steps, traces
 from db.models import StepRow
 from db.session import database
 from db.settings import settings
@@ -56,6 +56,7 @@ def _save(claim: steps.Claim, state: StepState, done: Done, seconds: float) -> b
         if claim.kind == ACCEPT and state == StepState.DONE:
             job.accept_after = utcnow() + timedelta(seconds=REST * seconds)
         done.save(session, job)
+        solver_time.add(session, job.project, seconds)
         return True
 
 

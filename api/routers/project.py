@@ -13,7 +13,7 @@ from api.schemas.common import Cursor, Listed
 from api.schemas.service import AuditLine, AuditPage, KeyPage, KeySummary, MadeKey, NewKey, Project
 from api.writing import writing
 from certifier.errors import CirisError
-from db import audit, keys, projects
+from db import audit, keys, projects, solver_time
 from db.audit import Action
 
 router = APIRouter(prefix="/v1", tags=["project"], dependencies=[READ], route_class=ReadingRoute)
@@ -24,11 +24,19 @@ KeyName = Annotated[str, Path(description="The name of a key that has not been r
 
 @router.get("/project")
 def get_project(caller: Reader, db: Db, room: KeptRoom) -> Project:
-    """Returns the project that the caller's key belongs to: how much it stores, and its limits."""
+    """Returns the project that the caller's key belongs to: how much it stores, how long solvers worked for it, and its limits."""
     with db.read() as session:
-        row = projects.get(session, caller.project)
-    size = room.stored(db, row.name)
-    return Project(name=row.name, scope=caller.scope, bytes=size, max_bytes=row.max_bytes, keep_days=row.keep_days)
+        row, seconds = projects.get(session, caller.project), solver_time.used(session, caller.project)
+    return Project(
+        name=row.name,
+        scope=caller.scope,
+        bytes=room.stored(db, row.name),
+        max_bytes=row.max_bytes,
+        keep_days=row.keep_days,
+        solver_seconds=seconds,
+        max_solver_seconds=row.max_solver_seconds,
+        month_ends_at=solver_time.month_ends(),
+    )
 
 
 @router.post("/keys", status_code=status.HTTP_201_CREATED)
@@ -46,8 +54,8 @@ def create_key(body: NewKey, caller: Admin, db: Db) -> MadeKey:
                 field="name",
                 hint="make it at the service's machine: `ciris key add`",
             )
-        key = keys.add(session, body.name, body.scope, caller.project)
-        audit.note(session, caller.project, str(caller), Action.KEY_MADE, f"{body.name} ({body.scope})")
+        key = keys.add(session, body.name, body.scope, caller.project, body.days)
+        audit.note(session, caller.project, str(caller), Action.KEY_MADE, keys.made(body.name, body.scope, body.days))
     return MadeKey(name=body.name, scope=body.scope, key=key)
 
 

@@ -8,8 +8,9 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, Field
 
 from api.schemas.common import Page
+from db import keys
 from db.audit import Action
-from db.keys import Scope
+from db.keys import MOST_DAYS, Scope
 from db.models import ApiKeyRow, AuditRow
 from jobs import patterns
 from jobs.fields import Request
@@ -33,6 +34,7 @@ class NewKey(Request):
 
     name: str = Field(pattern=patterns.KEY_NAME, description="No other key of the project may have this name.", examples=["planner"])
     scope: Scope = Field(description="What the key allows; each scope includes those before it: read, submit, admin.")
+    days: float | None = Field(None, gt=0, le=MOST_DAYS, description="The key expires after this many days; null for never.", examples=[90])
 
 
 class KeySummary(BaseModel):
@@ -42,11 +44,24 @@ class KeySummary(BaseModel):
     name: str = Field(description="The name by which it is revoked.")
     scope: Scope = Field(description="What the key allows.")
     created_at: datetime = Field(description="When it was made.")
-    revoked_at: datetime | None = Field(description="When it was revoked; null while it is valid.")
+    last_used_at: datetime | None = Field(
+        description="When it was last used, or up to ten minutes before; null where it was not, since the service keeps this."
+    )
+    expires_at: datetime | None = Field(description="When it will expire; null for never, and where it has ended.")
+    revoked_at: datetime | None = Field(description="When it was revoked, or has expired; null while it is valid.")
 
     @classmethod
     def of(cls, row: ApiKeyRow) -> Self:
-        return cls(id=row.id, name=row.name, scope=Scope(row.scope), created_at=row.created_at, revoked_at=row.revoked_at)
+        expires_at, revoked_at = keys.ends(row)
+        return cls(
+            id=row.id,
+            name=row.name,
+            scope=Scope(row.scope),
+            created_at=row.created_at,
+            last_used_at=row.last_used_at,
+            expires_at=expires_at,
+            revoked_at=revoked_at,
+        )
 
 
 class MadeKey(BaseModel):
@@ -101,3 +116,8 @@ class Project(BaseModel):
     bytes: int = Field(description="Bytes of scenes, jobs, proofs and cells that the project stores, as of some seconds ago.")
     max_bytes: int | None = Field(description="The service refuses new scenes and jobs once this many bytes are stored; null for no limit.")
     keep_days: float | None = Field(description="Days after a job's end when its data is deleted, except its regions; null for never.")
+    solver_seconds: float = Field(description="Seconds in which solvers have worked for the project since the calendar month (UTC) began.")
+    max_solver_seconds: float | None = Field(
+        description="The service refuses new jobs once solvers have worked for the project this many seconds in a month; null for no limit."
+    )
+    month_ends_at: datetime = Field(description="When the next month begins, and `solver_seconds` is 0 again.")

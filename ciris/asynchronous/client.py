@@ -222,16 +222,16 @@ class AsyncClient:
         await self._send("DELETE", f"/v1/{path}", params={"dependents": "delete" if dependents else "keep"})
 
     async def project(self) -> Document:
-        """Returns the project of the key: how much it stores, and its limits."""
+        """Returns the project of the key: how much it stores, how long solvers worked for it this month, and its limits."""
         return await self._json("GET", "/v1/project")
 
     async def keys(self) -> list[Document]:
         """Returns the keys of the project, newest first, without what is secret."""
         return await self._all("keys")
 
-    async def add_key(self, name: str, scope: str) -> Document:
-        """Makes a key of the project. The answer is the only one that shows it."""
-        return await self._json("POST", "/v1/keys", json={"name": name, "scope": scope})
+    async def add_key(self, name: str, scope: str, days: float | None = None) -> Document:
+        """Makes a key of the project, which expires after this many days, or never. The answer is the only one that shows it."""
+        return await self._json("POST", "/v1/keys", json={"name": name, "scope": scope, "days": days})
 
     async def revoke_key(self, name: str) -> None:
         """Revokes the project's key of this name."""

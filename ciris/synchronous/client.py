@@ -221,16 +221,16 @@ class Client:
         self._send("DELETE", f"/v1/{path}", params={"dependents": "delete" if dependents else "keep"})
 
     def project(self) -> Document:
-        """Returns the project of the key: how much it stores, and its limits."""
+        """Returns the project of the key: how much it stores, how long solvers worked for it this month, and its limits."""
         return self._json("GET", "/v1/project")
 
     def keys(self) -> list[Document]:
         """Returns the keys of the project, newest first, without what is secret."""
         return self._all("keys")
 
-    def add_key(self, name: str, scope: str) -> Document:
-        """Makes a key of the project. The answer is the only one that shows it."""
-        return self._json("POST", "/v1/keys", json={"name": name, "scope": scope})
+    def add_key(self, name: str, scope: str, days: float | None = None) -> Document:
+        """Makes a key of the project, which expires after this many days, or never. The answer is the only one that shows it."""
+        return self._json("POST", "/v1/keys", json={"name": name, "scope": scope, "days": days})
 
     def revoke_key(self, name: str) -> None:
         """Revokes the project's key of this name."""

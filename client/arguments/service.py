@@ -10,7 +10,7 @@ from client.arguments.common import Parser, as_json, group, remote
 
 def _limits(args: argparse.Namespace) -> list[str]:
     """Returns the words of ``ciris project set``."""
-    given = {"--max-bytes": args.max_bytes, "--keep-days": args.keep_days}
+    given = {"--max-bytes": args.max_bytes, "--keep-days": args.keep_days, "--max-solver-seconds": args.max_solver_seconds}
     return ["set", args.name, *(f"{option}={value}" for option, value in given.items() if value is not None)]
 
 
@@ -23,7 +23,9 @@ def add(verbs: Any) -> None:
 
     database = Parser(add_help=False)
     database.add_argument("--data", metavar="DIR", help="data directory; default: CIRIS_DATA_DIR; not used where CIRIS_DATABASE_URL is set")
-    project = group(verbs.add_parser("project", help="make and list projects and set their limits, in this machine's database"))
+    project = group(
+        verbs.add_parser("project", help="make and list projects and set their limits, in this machine's database; show your own")
+    )
     new = project.add_parser("add", parents=[database], help="make a project; its keys see nothing of other projects")
     new.add_argument("name", metavar="NAME", help="the new project's name")
     new.set_defaults(run="client.commands:in_database", module="db.projects", words=lambda args: ["add", args.name])
@@ -35,7 +37,14 @@ def add(verbs: Any) -> None:
     limits.add_argument("name", metavar="NAME", help="the project's name")
     limits.add_argument("--max-bytes", metavar="N", help="refuse new scenes and jobs once the project stores N bytes; 0: no limit")
     limits.add_argument("--keep-days", metavar="DAYS", help="delete a job's data, except its regions, DAYS days after its end; 0: never")
+    limits.add_argument(
+        "--max-solver-seconds",
+        metavar="S",
+        help="refuse new jobs in a calendar month (UTC) in which solvers have worked S seconds for the project; 0: no limit",
+    )
     limits.set_defaults(run="client.commands:in_database", module="db.projects", words=_limits)
+    mine = project.add_parser("show", parents=[remote(), as_json()], help="show your own project on a service: its limits, what is left")
+    mine.set_defaults(run="client.project:show")
 
     kept = group(verbs.add_parser("db", help="migrate, back up and restore this machine's database, or that of CIRIS_DATABASE_URL"))
     newest = kept.add_parser("upgrade", parents=[database], help="bring the tables to the newest revision; makes them where there are none")
@@ -68,8 +77,9 @@ def add(verbs: Any) -> None:
     made.add_argument(
         "--scope", choices=["read", "submit", "admin"], required=True, help="what the key allows; each scope includes those before it"
     )
+    made.add_argument("--days", type=float, metavar="N", help="the key expires after N days; default: never")
     made.set_defaults(run="client.keys:add")
-    listed = key.add_parser("ls", parents=[database, over_http, as_json()], help="list the keys, without their secrets")
+    listed = key.add_parser("ls", parents=[database, over_http, as_json()], help="list the keys, when each was last used, and no secrets")
     listed.set_defaults(run="client.keys:ls")
     revoked = key.add_parser(
         "revoke", parents=[database, over_http, of_project], help="revoke a key; the service refuses it within a second"

@@ -59,7 +59,8 @@ async function press(button: HTMLButtonElement): Promise<void> {
 async function makeKey(form: HTMLFormElement): Promise<void> {
   const place = document.getElementById("made-key")!;
   try {
-    const { name, key } = await post<{ name: string; key: string }>("/v1/keys", Object.fromEntries(new FormData(form)));
+    const given = Object.fromEntries(new FormData(form));
+    const { name, key } = await post<{ name: string; key: string }>("/v1/keys", { ...given, days: given.days ? Number(given.days) : null });
     place.className = "notice";
     place.replaceChildren(`The key ${name}. Copy it now, nobody can see it again: `, Object.assign(document.createElement("code"), { textContent: key }));
     form.reset();

@@ -52,7 +52,7 @@ SELDOM: dict[str, dict[str, Any]] = {
     "HeldWork": {"job": "1f9b2a7c-5b0e-4b58-9c39-2f1d6a3c8e10"},
     "JobMotion": CERTAIN,
     "KeyPage": {"next": "MjAyNi0wNS0wMVQwODowMDowMCswMDowMCA1ZDBj"},
-    "KeySummary": {"revoked_at": "2026-05-01T08:00:00Z"},
+    "KeySummary": {"last_used_at": "2026-04-30T16:00:00Z", "expires_at": "2026-05-29T08:00:00Z", "revoked_at": "2026-05-01T08:00:00Z"},
     "MotionResponse": CERTAIN,
     "Obstacle": {"faces": 4, "lost": 0.013},
     "PairCell": {"witness_q": [0.4, 0.3], "open_cells": 12},
@@ -70,7 +70,7 @@ SELDOM: dict[str, dict[str, Any]] = {
         },
         "uncovered": {"time": 0.625, "segment": 0, "q": [0.4, 0.3], "s": [0.2, 0.15], "next": None},
     },
-    "Project": {"max_bytes": 50_000_000_000, "keep_days": 30},
+    "Project": {"max_bytes": 50_000_000_000, "keep_days": 30, "max_solver_seconds": 720_000},
     "Promoted": {"scene": "2138b0193bfdd632", "regions": 3, "before": "0f8a6f0c2b7e11aa", "regions_before": 4},
     "ScenePage": {"next": "MjAyNi0wNS0wMVQwODowMDowMCswMDowMCA1ZDBj"},
     "Verification": {"error": {"code": "bad_proof", "message": "a plane does not separate its pair", "field": None, "hint": ""}},
@@ -263,7 +263,7 @@ def record(client: TestClient, database: Database) -> dict[str, Any]:
         service.key = keys.add(session, "admin", Scope.ADMIN)  # type: ignore[attr-defined]
         assert webhooks.of_job(session, grown["id"])
     time.sleep(1.5)
-    ask("POST", "/v1/keys", {"name": "planner", "scope": "read"})
+    ask("POST", "/v1/keys", {"name": "planner", "scope": "read", "days": 90})
     ask("DELETE", "/v1/keys/{name}", name="nobody")
     for route in ("/v1/keys", "/v1/audit", "/v1/project"):
         ask("GET", route)

@@ -29,6 +29,7 @@ from db.session import Database
 from tests.api.conftest import BASE_URL, PROBLEM
 from tests.api.test_jobs import GROW
 from tests.services import Queue
+from tests.workers.service import eventually
 
 
 def a_key(database: Database, scope: Scope, name: str | None = None) -> str:
@@ -308,6 +309,68 @@ def test_keys_in_use_are_read_again_together_and_others_are_not(database: Databa
         return seen
 
     assert len(asyncio.run(ask())) == 1
+
+
+def uses(database: Database) -> dict[str, bool]:
+    """Name of each key -> whether it is noted that it was used."""
+    with database.read() as session:
+        return {row.name: row.last_used_at is not None for row in keys.newest(session)}
+
+
+def test_the_use_of_a_key_is_noted_once_in_ten_minutes(client: TestClient, database: Database) -> None:
+    used, _, gone = (a_key(database, Scope.READ, name) for name in ("used", "unused", "gone"))
+    with database.write() as session:
+        keys.revoke(session, "gone")
+    writes: list[str] = []
+    event.listen(database.writer, "before_cursor_execute", lambda c, cursor, statement, *_: writes.append(statement))
+    for _ in range(50):
+        assert client.get("/v1/jobs", headers=bearer(used)).status_code == 200
+    for refused in (gone, used[:19] + secrets.token_urlsafe(32)):
+        assert client.get("/v1/jobs", headers=bearer(refused)).status_code == 401
+    eventually(lambda: uses(database)["used"], "the use is noted")
+    the_keys_are_read_again()
+    assert client.get("/v1/jobs", headers=bearer(used)).status_code == 200
+    time.sleep(0.2)
+    assert uses(database) == {"used": True, "unused": False, "gone": False}
+    assert sum("UPDATE api_keys" in statement for statement in writes) == 1
+
+
+def test_no_request_waits_for_the_note_that_its_key_was_used(client: TestClient, database: Database) -> None:
+    key = a_key(database, Scope.READ)
+    the_keys_are_read_again()
+    with database.write() as session:  # which nobody else can meanwhile
+        session.execute(text("SELECT 1"))
+        began = time.monotonic()
+        for _ in range(5):
+            assert client.get("/v1/jobs", headers=bearer(key)).status_code == 200
+        assert time.monotonic() - began < 5.0
+        assert uses(database) == {"read": False}
+    eventually(lambda: uses(database)["read"], "the use is noted")
+
+
+def test_a_use_that_cannot_be_noted_is_noted_later(
+    client: TestClient, database: Database, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("api.access.NOTES_SECONDS", 0.0)
+    key = a_key(database, Scope.READ)
+
+    def fail(*_: object) -> None:
+        raise OperationalError("UPDATE", {}, Exception("the disk is full"))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(keys, "note_use", fail)
+        assert client.get("/v1/jobs", headers=bearer(key)).status_code == 200
+        eventually(lambda: "could not be noted" in caplog.text, "the log says so")
+    assert client.get("/v1/jobs", headers=bearer(key)).status_code == 200
+    eventually(lambda: uses(database)["read"], "the use is noted")
+
+
+def test_a_key_that_has_expired_is_refused(client: TestClient, database: Database) -> None:
+    with database.write() as session:
+        key = keys.add(session, "visitor", Scope.READ, days=1.0 / 86400)
+    answers = [client.get("/v1/jobs", headers=bearer(key)).status_code]
+    time.sleep(1.2)
+    assert [*answers, client.get("/v1/jobs", headers=bearer(key)).status_code] == [200, 401]
 
 
 def test_keys_that_cannot_be_read_let_nobody_in_and_are_read_again(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -81,5 +81,8 @@ def test_a_project_without_room_takes_nothing_more_but_shows_and_deletes(
         "bytes": client.get("/v1/project").json()["bytes"],
         "max_bytes": size,
         "keep_days": None,
+        "solver_seconds": 0.2,
+        "max_solver_seconds": None,
+        "month_ends_at": client.get("/v1/project").json()["month_ends_at"],
     }
     assert client.get("/v1/project").json()["bytes"] < size

@@ -5,15 +5,18 @@ from __future__ import annotations
 import json
 import subprocess
 import time
+from contextlib import closing
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
 
 from api.access import KEYS_SECONDS
-from db import keys, migrate, projects
+from db import audit, keys, migrate, projects, solver_time
 from db.keys import Scope
 from db.session import Database
 from db.settings import Settings
+from db.types import utcnow
 from tests.client.conftest import Ciris, command, surroundings
 
 
@@ -41,11 +44,30 @@ def test_an_admin_manages_the_keys_of_the_project_over_http(ciris: Ciris, url: s
     assert ciris("job", "ls", "--json", CIRIS_URL=url, CIRIS_API_KEY=key).json == []
     listed = ciris("key", "ls", "--url", url, "--json", CIRIS_API_KEY=admin)
     assert [(one["name"], one["scope"]) for one in listed.json] == [("planner", "read"), ("boss", "admin")]
-    assert "planner" in ciris("key", "ls", "--url", url, CIRIS_API_KEY=admin).stdout
+    table = ciris("key", "ls", "--url", url, CIRIS_API_KEY=admin).stdout
+    assert ("planner" in table, "last used" in table) == (True, True)
+    assert ciris("key", "add", "visitor", "--scope", "read", "--days", "90", "--url", url, CIRIS_API_KEY=admin).status == 0
+    visitor, planner, boss = ciris("key", "ls", "--url", url, "--json", CIRIS_API_KEY=admin).json
+    in_90_days = (utcnow() + timedelta(days=90)).date().isoformat()
+    assert (visitor["expires_at"][:10], planner["expires_at"], boss["revoked_at"]) == (in_90_days, None, None)
+    assert (visitor["last_used_at"], boss["last_used_at"][:4]) == (None, str(utcnow().year))
     assert ciris("key", "add", "x", "--scope", "admin", "--url", url, CIRIS_API_KEY=key).status == 2
     assert ciris("key", "revoke", "planner", "--url", url, CIRIS_API_KEY=admin).status == 0
     time.sleep(KEYS_SECONDS)
     assert ciris("job", "ls", CIRIS_URL=url, CIRIS_API_KEY=key).status == 2
+
+
+def test_the_command_shows_what_a_project_has_used_and_what_is_left(ciris: Ciris, url: str, database: Database) -> None:
+    with database.write() as session:
+        solver_time.add(session, "default", 60.0)
+    shown = ciris("project", "show", CIRIS_URL=url)
+    assert (shown.status, "60 s this month\n" in shown.stdout) == (0, True)
+    with database.write() as session:
+        projects.get(session, "default").max_solver_seconds = 200.0
+    ends = solver_time.month_ends().date().isoformat()
+    assert f"60 of 200 s this month; 140 s left until {ends}" in ciris("project", "show", CIRIS_URL=url).stdout
+    found = ciris("project", "show", "--json", CIRIS_URL=url).json
+    assert (found["solver_seconds"], found["max_solver_seconds"]) == (60.0, 200.0)
 
 
 def test_projects_on_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
@@ -53,17 +75,22 @@ def test_projects_on_the_command_line(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.delenv("CIRIS_DATABASE_URL", raising=False)  # other tests of this process may use another database
     migrate.upgrade(Settings().database)
     projects.main(["add", "welding"])
-    projects.main(["set", "welding", "--max-bytes", "1e9", "--keep-days", "30"])
+    projects.main(["set", "welding", "--max-bytes", "1e9", "--keep-days", "30", "--max-solver-seconds", "720e3"])
     keys.main(["add", "planner", "--scope", "read", "--project", "welding"])
     capsys.readouterr()
     projects.main(["ls", "--json"])
     listed = json.loads(capsys.readouterr().out)
-    assert [(row["name"], row["max_bytes"], row["keep_days"]) for row in listed] == [("default", None, None), ("welding", 10**9, 30.0)]
+    columns = ("name", "max_bytes", "keep_days", "max_solver_seconds", "solver_seconds")
+    found = [tuple(row[name] for name in columns) for row in listed]
+    assert found == [("default", None, None, None, 0.0), ("welding", 10**9, 30.0, 720e3, 0.0)]
     keys.main(["ls", "--json"])
     assert [(row["name"], row["project"]) for row in json.loads(capsys.readouterr().out)] == [("planner", "welding")]
     projects.main(["set", "welding", "--max-bytes", "0"])
     projects.main(["ls"])
     assert "max_bytes" not in capsys.readouterr().out
+    with closing(Database(Settings().database)) as database, database.of("welding").read() as session:
+        said = [row.what for row in audit.page(session).rows if row.action == "limits_set"]
+    assert "max_bytes 1000000000, keep_days 30.0, max_solver_seconds 720000.0" in said
     for wrong in (["set", "welding", "--keep-days", "-1"], ["set", "nobody"], ["add", "welding"]):
         with pytest.raises(SystemExit) as ended:
             projects.main(wrong)
@@ -76,6 +103,7 @@ def test_projects_on_the_command_line(tmp_path: Path, monkeypatch: pytest.Monkey
         ("--max-bytes", "1e19", f"is more than {2**62}"),
         ("--max-bytes", "inf", f"is more than {2**62}"),
         ("--keep-days", "1000000", "is more than 36500"),
+        ("--max-solver-seconds", "-1", "is not a number from 0 on"),
     ):
         with pytest.raises(SystemExit):
             projects.main(["set", "welding", option, number])

@@ -145,6 +145,54 @@ def test_a_key_is_forgotten_once_its_jobs_have_ended(db: Database, monkeypatch: 
         assert {job.key_id for job in session.scalars(select(JobRow))} == {None}
 
 
+def test_a_key_that_expires_is_a_revoked_key_from_then_on(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(settings(), "max_keys_per_project", 2)
+    began = utcnow()
+
+    def after(days: float) -> None:
+        monkeypatch.setattr(keys, "utcnow", lambda: began + timedelta(days=days))
+
+    with db.write() as session:
+        key, lasting = keys.add(session, "visitor", Scope.READ, days=90), keys.add(session, "planner", Scope.READ)
+        with pytest.raises(CirisError, match="there is a key 'visitor' already"):
+            keys.add(session, "visitor", Scope.READ)
+    for days, valid in ((89.9, True), (90.1, False)):
+        after(days)
+        with db.read() as session:
+            found = keys.check(session, key)
+            assert (found is not None, keys.check(session, lasting) is not None) == (valid, True)
+            (expires_at, revoked_at), (never, not_yet) = (
+                keys.ends(row) for row in sorted(keys.newest(session), key=lambda r: r.name)[::-1]
+            )
+        assert ((expires_at is None, revoked_at is None), (never, not_yet)) == ((not valid, valid), (None, None))
+    with db.write() as session:
+        with pytest.raises(CirisError, match="there is no key"):
+            keys.revoke(session, "visitor")
+        with pytest.raises(CirisError, match="the most that it may have"):
+            keys.add(session, "visitor", Scope.READ)  # it counts for a day more
+        after(91.1)
+        keys.add(session, "visitor", Scope.READ)
+        revoked_ago(session, "planner", -100)  # it will be
+    with db.read() as session:
+        assert list(keys.forgettable(session, began + timedelta(days=119))) == []
+        assert list(keys.forgettable(session, began + timedelta(days=121))) == [key.split("_")[1]]
+
+
+def test_the_use_of_a_key_is_noted_now_and_then(db: Database) -> None:
+    with db.write() as session:
+        used, unused = (keys.add(session, name, Scope.READ).split("_")[1] for name in ("used", "unused"))
+    now = utcnow()
+    noted = {}
+    for seconds in (0.0, 599.0, 601.0):
+        with db.write() as session:
+            keys.note_use(session, [used], now + timedelta(seconds=seconds))
+        with db.read() as session:
+            at = {row.id: row.last_used_at for row in keys.newest(session)}
+        noted[seconds] = None if at[used] is None else (at[used] - now).total_seconds()
+        assert at[unused] is None
+    assert noted == {0.0: 0.0, 599.0: 0.0, 601.0: 601.0}
+
+
 @pytest.mark.parametrize("name", ["", "-x", "a b", "a" * 65, "a\n"])
 def test_names_that_cannot_be_typed_are_refused(db: Database, name: str) -> None:
     with db.write() as session, pytest.raises(CirisError, match="no name for a key"):
@@ -164,7 +212,8 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     key = capsys.readouterr().out.strip()
     keys.main(["ls", "--json"])
     (listed,) = json.loads(capsys.readouterr().out)
-    assert (listed["name"], listed["scope"], listed["revoked_at"]) == ("planner", "submit", None)
+    assert (listed["name"], listed["scope"]) == ("planner", "submit")
+    assert (listed["last_used_at"], listed["expires_at"], listed["revoked_at"]) == (None, None, None)
     assert listed["id"] == key.split("_")[1]
     keys.main(["revoke", "planner"])
     keys.main(["ls"])
@@ -175,3 +224,11 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
         keys.main(["revoke", "planner"])
     assert ended.value.code == 2
     assert capsys.readouterr().err == "error: name: there is no key 'planner' (`ciris key ls` lists them)\n"
+    keys.main(["add", "visitor", "--scope", "read", "--days", "90"])
+    capsys.readouterr()
+    keys.main(["ls"])
+    assert f"expires_at {(utcnow() + timedelta(days=90)).date()}" in capsys.readouterr().out
+    for days in ("0", "-1", "nan", "3651", "some"):
+        with pytest.raises(SystemExit):
+            keys.main(["add", "other", "--scope", "read", "--days", days])
+        assert f"{days} is not a number of days above 0, of at most 3650" in capsys.readouterr().err

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from sqlalchemy import update
 
-from db import command_line, jobs, keys, migrate, projects, retention
+from db import command_line, jobs, keys, migrate, projects, retention, solver_time
 from db.disk import Disk
 from db.keys import Scope
 from db.models import JobRow
@@ -26,6 +26,15 @@ def full(t: Trial) -> None:
     t.need("scene")
     with t.need("database").write() as session:
         projects.get(session, "default").max_bytes = 1
+    post(t, GROW)
+
+
+def out_of_time(t: Trial) -> None:
+    """Asks for a job in a project for which solvers have worked as long as they may."""
+    t.need("scene")
+    with t.need("database").write() as session:
+        projects.get(session, "default").max_solver_seconds = 60.0
+        solver_time.add(session, "default", 60.0)
     post(t, GROW)
 
 
@@ -118,6 +127,7 @@ TEAMS: Table = {
     ("no_room", "--data"): [lambda t: kept_key(t.directory / "absent" / "secret.key")],
     ("webhook_waits", "job"): [resent_too_soon],
     ("storage_quota", ""): [full],
+    ("time_quota", ""): [out_of_time],
     ("no_room", ""): [without_room],
     ("too_many_keys", "name"): [one_key_too_many],
     ("first_key", "name"): [lambda t: t.ask("POST", "/v1/keys", json={"name": "mine", "scope": "admin"})],

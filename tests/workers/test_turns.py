@@ -14,8 +14,8 @@ from sqlalchemy.exc import OperationalError
 from certifier.errors import CirisError
 from certifier.outcome import Outcome
 from certifier.pair.forecast import forecast
-from db import jobs, leases, pairs, projects, regions, retention, steps, transaction, workers
-from db.models import JobRow, PairRow, ProofRow, StepRow
+from db import jobs, leases, pairs, projects, regions, retention, solver_time, steps, transaction, workers
+from db.models import DEFAULT_PROJECT, JobRow, PairRow, ProofRow, StepRow
 from db.session import database
 from db.settings import settings
 from db.states import WorkerState
@@ -52,6 +52,16 @@ def test_work_is_done_once(job_id: str) -> None:
     assert [(row.state, row.attempts) for row in pairs_of(job_id)] == [("certified", 1)] * 3
 
 
+def test_what_solvers_do_for_a_job_counts_for_its_project(job_id: str) -> None:
+    while work_all():
+        coordinate(job_id)
+    with database().read() as session:
+        accepting = sum(step.seconds or 0.0 for step in steps.of_job(session, job_id))
+        spent = (pairs.seconds(session, job_id), accepting, solver_time.used(session, DEFAULT_PROJECT))
+    assert min(spent) > 0
+    assert spent[2] == pytest.approx(spent[0] + spent[1])
+
+
 def of_another_project(job_id: str) -> None:
     with database().write() as session:
         projects.add(session, "others")
@@ -74,15 +84,32 @@ def test_the_rest_of_a_batch_is_given_back_when_another_project_waits(job_id: st
     assert {row.state for job in (job_id, other) for row in pairs_of(job)} == {"certified"}
 
 
+def test_the_rest_of_a_batch_is_given_back_at_once_for_a_job_that_nobody_has_begun(job_id: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("workers.pairs.SAVE_SECONDS", 0.0)
+    other = submit(slider(posts=3), box_around([0.0], 0.2))
+    coordinate(other)
+    first, second = work(), work()
+    assert first is not None
+    assert second is not None
+    assert (first.settles, {first.job_id, second.job_id}) == (False, {job_id, other}), "the other job has the next solver"
+    begun = pairs_of(first.job_id)
+    assert [(row.state, row.attempts) for row in begun] == [("certified", 1), ("open", 0), ("open", 0)]
+    assert second.settles, "for a job that was begun nobody gives a batch back before its time"
+    work_all()
+    assert {row.state for job in (job_id, other) for row in pairs_of(job)} == {"certified"}
+
+
 def test_a_batch_is_done_to_its_end_while_nobody_else_waits(job_id: str, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("SAVE_SECONDS", "HELD_SECONDS"):
         monkeypatch.setattr(f"workers.pairs.{name}", 0.0)
     assert work() == Piece(job_id, True)
 
 
-def test_a_long_step_is_given_up_for_another_project(job_id: str) -> None:
-    """The job of the other project has pairs. Two others seed, on the two processes that there are."""
-    of_another_project(job_id)
+@pytest.mark.parametrize("where", ["another project", "the same key"])
+def test_a_long_step_is_given_up_for_a_job_with_pairs(job_id: str, where: str) -> None:
+    """The job has pairs, and nobody has begun it. Two others seed, on the two processes that there are."""
+    if where == "another project":
+        of_another_project(job_id)
     claims = []
     with database().write() as session:
         workers.tell(session, Made("host:1:1", WorkerKind.SOLVE, "1", 2, cores=2, memory_bytes=1), WorkerState.RUNNING)
@@ -96,8 +123,30 @@ def test_a_long_step_is_given_up_for_another_project(job_id: str) -> None:
         assert [row.state for row in session.scalars(select(StepRow).order_by(StepRow.id))] == ["running", "open"]
     assert claims[1] is not None
     lost = [event.data for event in events_of(claims[1].job_id) if event.kind == "lost"]
-    assert [(one["step"], one["reason"]) for one in lost] == [("propose", "another project had no solver")]
+    reason = {"another project": "another project had no solver", "the same key": "a job that no solver had begun waited with pairs"}[where]
+    assert [(one["step"], one["reason"]) for one in lost] == [("propose", reason)]
     assert waiting(SOLVE) > 0
+    with database().write() as session:  # what was given up begins again, and is not given up again
+        again = steps.claim(session, jobs.lock(session, claims[1].job_id), accepts=False, lease_seconds=60)
+        assert (again is not None, again and again.attempt) == (True, 2)
+        session.execute(update(StepRow).where(StepRow.id == claims[0].step_id).values(attempts=2))  # type: ignore[union-attr]
+    sweeper.give_way()
+    with database().read() as session:
+        assert [row.state for row in session.scalars(select(StepRow).order_by(StepRow.id))] == ["running", "running"]
+
+
+def test_no_step_is_given_up_for_a_job_that_was_begun(job_id: str) -> None:
+    with database().write() as session:
+        jobs.claimed(jobs.lock(session, job_id))
+        workers.tell(session, Made("host:1:1", WorkerKind.SOLVE, "1", 2, cores=2, memory_bytes=1), WorkerState.RUNNING)
+        for _ in range(2):
+            job = a_job(session)
+            jobs.start(session, job)
+            steps.add(session, job, "propose", {})
+            steps.claim(session, job, accepts=False, lease_seconds=60)
+    sweeper.give_way()
+    with database().read() as session:
+        assert [row.state for row in session.scalars(select(StepRow))] == ["running", "running"]
 
 
 def test_a_pair_that_failed_is_expected_to_take_as_long_the_next_time() -> None:

@@ -1,0 +1,53 @@
+"""This module counts the seconds in which solvers work for a project, by calendar month in UTC, and holds projects to their limits.
+
+What a pair or a step took is counted when its result is saved, in the same transaction. A project has one row for each month, so that
+nobody adds up the pairs and steps of the past, and deleting them gives nothing back.
+"""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+
+from sqlalchemy.orm import Session
+
+from certifier.errors import CirisError
+from db.models import ProjectRow, SolverTimeRow
+from db.session import inserting
+from db.types import utcnow
+
+
+def add(session: Session, project: str, seconds: float) -> None:
+    """Counts seconds of work for a project. It is the last thing that a transaction does: other jobs of the project wait for the row."""
+    new = inserting(session, SolverTimeRow).values(project=project, month=_month(utcnow()), seconds=seconds)
+    total = SolverTimeRow.seconds + new.excluded.seconds
+    session.execute(new.on_conflict_do_update(index_elements=["project", "month"], set_={"seconds": total}))
+
+
+def used(session: Session, project: str) -> float:
+    """Returns the seconds in which solvers have worked for the project in the present month."""
+    row = session.get(SolverTimeRow, (project, _month(utcnow())))
+    return 0.0 if row is None else row.seconds
+
+
+def month_ends() -> datetime:
+    """Returns the moment at which the next month begins, and counting with it."""
+    first = utcnow().replace(day=1, hour=0, minute=0, second=0, microsecond=0)
+    return (first + timedelta(days=31)).replace(day=1)
+
+
+def check(session: Session, project: str) -> None:
+    """Refuses another job of a project that has used up its time of this month.
+
+    Raises:
+        CirisError: time_quota.
+    """
+    most, seconds = session.get_one(ProjectRow, project).max_solver_seconds, used(session, project)
+    if most is not None and seconds >= most:
+        problem = f"the project {project} has used {seconds:.0f} of the {most:.0f} s of solvers that it may use in {_month(utcnow())}"
+        again = f"{month_ends():%Y-%m-%d} at 00:00 UTC"
+        hint = f"it may start jobs again on {again}; or have the limit raised: `ciris project set {project} --max-solver-seconds N`"
+        raise CirisError("time_quota", problem, hint=hint)
+
+
+def _month(time: datetime) -> str:
+    return f"{time:%Y-%m}"
