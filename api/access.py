@@ -38,7 +38,7 @@ AGAIN_SECONDS = 0.1
 MOST_KEYS = 10_000
 """This many keys are remembered. The one that was not used for longest is looked up again when it comes."""
 NOTES_SECONDS = 5.0
-"""When it could not be noted that keys were used, this is tried again after so many seconds."""
+"""When it could not be noted that keys were used, this is tried again after this many seconds."""
 _thread = ThreadPoolExecutor(1, "keys")
 """Every request may wait for the keys, so their reading waits for no other request."""
 _notes = ThreadPoolExecutor(1, "uses of keys")

@@ -31,7 +31,7 @@ def show(args: Namespace) -> int:
 
 
 def _solvers(project: Document) -> str:
-    """Returns how long solvers have worked for the project this month, and what is left, in seconds as the limit is set."""
+    """Returns how long solvers have worked for the project this month, and what remains, in seconds as the limit is set."""
     used, most = project["solver_seconds"], project["max_solver_seconds"]
     if most is None:
         return f"{used:.0f} s this month"

@@ -15,7 +15,7 @@ from certifier.pair.collisions import contacts
 from certifier.seeding.limits import check_limits
 
 SAMPLES, LOOKED_AT = 100, 10_000
-"""Lines are looked at in at most SAMPLES configurations altogether, and in so many that LOOKED_AT pairs are."""
+"""Lines are looked at in at most SAMPLES configurations altogether, and at most LOOKED_AT pairs in all of these together."""
 
 
 def check_length(scene: Scene, values: Sequence[float], field: str, code: str) -> None:

@@ -32,9 +32,9 @@ log = logging.getLogger(__name__)
 SAVE_SECONDS = 2.0
 """Results are saved together once this much time has passed since the last saving."""
 HELD_SECONDS = 5.0
-"""The rest of a batch is given back when others wait and this much time has passed since its first pair was done, and for a job that
-nobody has begun after the first saving. Forecasts may be far too
-short. Before the first pair, a process may have to load the scene and the polytope."""
+"""The rest of a batch is given back when others wait and this much time has passed since its first pair was done, and for a job that nobody
+has begun after the first saving. Forecasts may be far too short. Before the first pair, a process may have to load the scene and the
+polytope."""
 
 CertifyPair = Callable[[pairs.Claim, pairs.Claimed], PairResult]
 

@@ -222,7 +222,7 @@ def multipliers(
 
 
 @njit(cache=True)
-def rounded(x: float) -> float:
+def rounded(x: float) -> np.float32:
     """Returns a multiplier as a proof stores it: in single precision, with BITS bits (T. J. Dekker, 1971)."""
     t = _SPLIT * x
     return np.float32(t - (t - x))

@@ -26,7 +26,7 @@ _LITTER = {"__MACOSX", ".DS_Store"}
 SCENE_FILE = "scene.yaml"
 """A zip without an index has its scene in this file."""
 _NAMED = 3
-"""So many files are named where there are several."""
+"""At most this many files are named where there are several."""
 MODELS = (".urdf", ".sdf", ".mjcf")
 """A zip without a scene file is taken for the robot whose model it has."""
 

@@ -43,7 +43,9 @@ def add(verbs: Any) -> None:
         help="refuse new jobs in a calendar month (UTC) in which solvers have worked S seconds for the project; 0: no limit",
     )
     limits.set_defaults(run="client.commands:in_database", module="db.projects", words=_limits)
-    mine = project.add_parser("show", parents=[remote(), as_json()], help="show your own project on a service: its limits, what is left")
+    mine = project.add_parser(
+        "show", parents=[remote(), as_json()], help="show your own project on a service: its limits, and what remains of them"
+    )
     mine.set_defaults(run="client.project:show")
 
     kept = group(verbs.add_parser("db", help="migrate, back up and restore this machine's database, or that of CIRIS_DATABASE_URL"))
