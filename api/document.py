@@ -51,7 +51,7 @@ ALSO: dict[str, tuple[str, ...]] = {
     "cancel_jobs": ("job_not_found", "ambiguous_id", "busy"),
     "delete_job": ("has_dependents", "not_ended", "busy"),
     "cancel_job": ("busy",),
-    "retry_job": ("job_not_retryable", "quota_exceeded", "time_quota", "busy"),
+    "retry_job": ("job_not_retryable", "quota_exceeded", "storage_quota", "time_quota", "busy"),
     "get_job_cover": ("cover_not_found",),
     "get_job_map": ("map_not_found",),
     "download_map_proof": ("map_not_found", "proof_not_found"),

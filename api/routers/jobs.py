@@ -83,7 +83,7 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ], route_
 @router.post(
     "",
     status_code=status.HTTP_201_CREATED,
-    responses={200: {"model": Job, "description": "The job was made earlier with the same Idempotency-Key."}},
+    responses={200: {"model": AcceptedJob, "description": "The job was made earlier with the same Idempotency-Key."}},
 )
 @writing
 def create_job(
@@ -243,12 +243,19 @@ def cancel_job(job_id: JobGiven, db: Db, background: BackgroundTasks, announceme
 @router.post("/{job_id}/retry", status_code=status.HTTP_201_CREATED)
 @writing
 def retry_job(
-    job_id: JobGiven, caller: Submitter, db: Db, response: Response, background: BackgroundTasks, announcements: Announcements
+    job_id: JobGiven,
+    caller: Submitter,
+    db: Db,
+    response: Response,
+    background: BackgroundTasks,
+    announcements: Announcements,
+    room: KeptRoom,
 ) -> Job:
     """Creates a new job like one that failed or was cancelled.
 
     A repetition of the request returns the same new job.
     """
+    room.check(db, caller.project)
     with db.write() as session:
         job = jobs.retry(session, job_id, caller.key_id)
     background.add_task(announcements.announce, job.id)

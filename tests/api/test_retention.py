@@ -65,6 +65,8 @@ def test_a_project_without_room_takes_nothing_more_but_shows_and_deletes(
 ) -> None:
     for name in ("COUNT_SECONDS", "COST"):
         monkeypatch.setattr(f"api.room.{name}", 0.0)
+    stopped = client.post("/v1/jobs", json=GROW).json()["id"]
+    client.post(f"/v1/jobs/{stopped}/cancel")
     size = client.get("/v1/project").json()["bytes"]
     with database.write() as session:
         projects.get(session, "default").max_bytes = size
@@ -72,8 +74,11 @@ def test_a_project_without_room_takes_nothing_more_but_shows_and_deletes(
     assert (refused.status_code, refused.json()["code"]) == (403, "storage_quota")
     upload = client.post("/v1/scenes", files={"bundle": ("scene.zip", b"anything", "application/zip")})
     assert (upload.status_code, upload.json()["code"]) == (403, "storage_quota")
+    again = client.post(f"/v1/jobs/{stopped}/retry")
+    assert (again.status_code, again.json()["code"]) == (403, "storage_quota")
     assert client.get("/v1/regions").json()["regions"][0]["id"] == region
     assert client.delete(f"/v1/regions/{region}").status_code == 204
+    assert client.post(f"/v1/jobs/{stopped}/retry").status_code == 201
     assert client.post("/v1/jobs", json=GROW).status_code == 201
     assert client.get("/v1/project").json() == {
         "name": "default",
