@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 from api.advice import seed_between
+from api.free_sets import Mapped
 from api.schemas.planning import Edge, Gap, GraphRegion, GraphResponse
 from certifier.model import Scene
 from certifier.outcome import Guarantee
@@ -20,8 +21,12 @@ MOST_GAPS = 20
 """Gaps are looked for around at most this many components, the largest."""
 
 
-def describe(db: Database, scene_id: str, scene: Scene, library: Library) -> GraphResponse:
-    """Returns the graph of the library's regions, after comparing pairs for at most COMPARE_SECONDS."""
+def describe(db: Database, mapped: Mapped | None, scene_id: str, scene: Scene, library: Library) -> GraphResponse:
+    """Returns the graph of the library's regions, after comparing pairs for at most COMPARE_SECONDS.
+
+    Args:
+        mapped: what the scene's latest map proves.
+    """
     complete, known = compared(db, scene_id, library)
     number = {region_id: i for i, region_id in enumerate(library.ids)}
     parts = components(len(library), [(number[edge.earlier], number[edge.later]) for edge in known])
@@ -37,7 +42,8 @@ def describe(db: Database, scene_id: str, scene: Scene, library: Library) -> Gra
         ],
         edges=[Edge(a=edge.earlier, b=edge.later, depth=edge.depth, q=scene.to_q(edge.witness).tolist(), s=edge.witness) for edge in known],
         components=len(parts),
-        gaps=_gaps(library, scene, parts) if complete else [],
+        gaps=_gaps(library, scene, parts, mapped) if complete else [],
+        map=None if mapped is None else mapped.job,
     )
 
 
@@ -68,16 +74,13 @@ def _compare(db: Database, scene_id: str, library: Library, until: float) -> boo
     return complete
 
 
-def _gaps(library: Library, scene: Scene, parts: list[list[int]]) -> list[Gap]:
+def _gaps(library: Library, scene: Scene, parts: list[list[int]], mapped: Mapped | None) -> list[Gap]:
     found = {frozenset((near.a, near.b)): near for part in parts[:MOST_GAPS] if (near := gap(library, part)) is not None}
-    return [
-        Gap(
-            a=library.ids[near.a],
-            b=library.ids[near.b],
-            distance=near.distance,
-            q=seed_between(scene, library, near),
-            q_a=scene.to_q(near.s_a).tolist(),
-            q_b=scene.to_q(near.s_b).tolist(),
-        )
-        for near in found.values()
-    ]
+    gaps = []
+    for near in found.values():
+        q_a, q_b = scene.to_q(near.s_a), scene.to_q(near.s_b)
+        by_map = mapped is not None and bool(mapped.free.contains_motion(q_a, q_b))
+        a, b = library.ids[near.a], library.ids[near.b]
+        seed = seed_between(scene, library, near)
+        gaps.append(Gap(a=a, b=b, distance=near.distance, q=seed, q_a=q_a.tolist(), q_b=q_b.tolist(), map=by_map))
+    return gaps

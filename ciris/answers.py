@@ -241,6 +241,8 @@ class Gap:
     """(n,) a's point that is nearest to b."""
     q_b: Array
     """(n,) b's point that is nearest to a."""
+    map: bool
+    """Whether the scene's latest map proves the motion from q_a straight in q to q_b: no region has to be grown for it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,6 +254,8 @@ class Graph:
     edges: tuple[Edge, ...]
     components: int
     gaps: tuple[Gap, ...]
+    map: str | None
+    """The job that has grown the scene's latest map; None where the scene has none."""
 
     def __repr__(self) -> str:
         return f"Graph({len(self.nodes)} regions, {len(self.edges)} overlaps, {self.components} components)"

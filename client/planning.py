@@ -166,7 +166,8 @@ def graph(args: Namespace) -> int:
         rows = [(edge["a"], edge["b"], f"{edge['depth']:.3g}", _place(edge["q"])) for edge in answer["edges"]]
         output.print_table(("region", "overlaps", "depth", "witness q"), rows, right="depth")
     for gap in answer["gaps"]:
-        print(f"gap of {gap['distance']:.3g} in s between {gap['a']} and {gap['b']}; {_advice(gap)}")
+        said = "the map proves the straight motion across it" if gap["map"] else _advice(gap)
+        print(f"gap of {gap['distance']:.3g} in s between {gap['a']} and {gap['b']}; {said}")
     return OK
 
 

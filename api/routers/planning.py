@@ -13,7 +13,7 @@ from api import answers, checks, graph
 from api.access import READ, Db
 from api.answers import asked
 from api.children import Children
-from api.free_sets import KeptFreeSets, Mapped
+from api.free_sets import FreeSetsKept, KeptFreeSets, Mapped
 from api.libraries import KeptLibraries, Libraries
 from api.motions import KeptMotions
 from api.named import with_positions
@@ -125,6 +125,7 @@ def cover_path(body: PathRequest, db: Db, libraries: KeptLibraries, motions: Kep
 async def get_graph(
     db: Db,
     libraries: KeptLibraries,
+    free_sets: KeptFreeSets,
     children: Children,
     scene: Annotated[
         str, Query(min_length=1, max_length=255, description="The id or the name of a scene, or `NAME@staged`.", examples=["planar-2dof"])
@@ -132,13 +133,16 @@ async def get_graph(
 ) -> GraphResponse:
     """Returns which regions of a scene overlap, which sets of them are connected, and where to seed a region that may join two sets.
 
+    Where the latest map proves the straight motion from one set to the other, the gap says so.
+
     Pairs of regions that were not compared yet are compared now, for a few seconds. Ask again until `complete` is true.
     """
-    return await children.run(_graph, db, libraries, scene)
+    return await children.run(_graph, db, libraries, free_sets, scene)
 
 
-def _graph(db: Database, libraries: Libraries, name: str) -> GraphResponse:
-    return graph.describe(db, *asked(db, libraries, name))
+def _graph(db: Database, libraries: Libraries, free_sets: FreeSetsKept, name: str) -> GraphResponse:
+    scene_id, scene, library = asked(db, libraries, name)
+    return graph.describe(db, free_sets.of(db, scene_id), scene_id, scene, library)
 
 
 def _points(scene: Scene, q: Sequence[Sequence[float]] | None, s: Sequence[Sequence[float]] | None) -> Array:

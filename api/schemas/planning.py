@@ -300,11 +300,16 @@ class Gap(BaseModel):
     ]
     q_a: Annotated[list[float], Field(description="(n,), joint positions of a's point that is nearest to b.", examples=[[0.3, 0.3]])]
     q_b: Annotated[list[float], Field(description="(n,), joint positions of b's point that is nearest to a.", examples=[[0.5, 0.3]])]
+    map: bool = Field(
+        description="Whether the scene's latest map proves the motion from q_a straight in q to q_b: no region has to be grown for it.",
+        examples=[False],
+    )
 
 
 class GraphResponse(Answer):
     """Describes the connected regions of a scene."""
 
+    map: MapJob | None = Field(description="The job that has grown the scene's latest map; null where the scene has none.")
     complete: bool = Field(
         description="Whether every pair of regions has been compared. Pairs are compared once, when this is asked, for a few seconds at a "
         "time: ask again until it is true.",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,11 +11,15 @@ from fastapi.testclient import TestClient
 
 from api import graph
 from api.app import create_app
+from certifier.jobs.map import grow_map
 from certifier.jobs.region import Region, certified_region
+from certifier.map.free_set import as_file, free_set
 from certifier.model import Scene
 from certifier.pair.certification import Certification
-from db import overlaps
+from db import jobs, overlaps, regions
+from db.models import StepRow
 from db.session import Database
+from db.states import ACCEPT, StepState
 from planner import overlap
 from tests.api.conftest import BASE_URL, store_region
 from tests.certifier.scenes import accepted
@@ -171,6 +176,31 @@ def test_the_graph_grows_with_the_regions_and_shows_gaps(client: TestClient, reg
     assert ({gap["a"], gap["b"]}, gap["distance"], gap["q"]) == ({beside, far}, pytest.approx(0.2), [pytest.approx(0.5)])
     assert client.delete(f"/v1/regions/{beside}").status_code == 204
     assert client.get("/v1/planning/graph?scene=slider").json()["edges"] == []
+
+
+def test_a_gap_that_the_latest_map_proves_says_so(client: TestClient, region: str, scene: Scene, database: Database) -> None:
+    far = store_region(database, a_part(0.6, 0.9))
+    before = client.get("/v1/planning/graph?scene=slider").json()
+    assert (before["map"], [gap["map"] for gap in before["gaps"]]) == (None, [False])
+    with database.write() as session:
+        scene_id = regions.get(session, far).scene_id
+    for proves in (True, False):  # the second map, which is the latest then, is that of a scene with a post in the gap
+        free = free_set(grow_map(scene if proves else blocked(scene), 1.0, deadline_s=10.0).proof)
+        with database.write() as session:
+            job, _ = jobs.create(session, kind="map", scene_id=scene_id, options={})
+            session.add(StepRow(job_id=job.id, turn=1, input={}, kind=ACCEPT, state=StepState.DONE, report={}, data=as_file(free)))
+        found = client.get("/v1/planning/graph?scene=slider").json()
+        (gap,) = found["gaps"]
+        assert (found["map"], gap["map"]) == (job.id, proves)
+        motion = {"scene": "slider", "q": [[gap["q_a"], gap["q_b"]]]}
+        (covering,) = client.post("/v1/planning/segment", json=motion).json()["segments"]
+        assert covering["covered"] == proves
+
+
+def blocked(scene: Scene) -> Scene:
+    """The scene with a post in the way of the slider, at x = 0.5."""
+    cart, post, *others = scene.geometries
+    return replace(scene, geometries=(cart, replace(post, vertices=np.array([[0.5, 0.0, 0.0]])), *others))
 
 
 def test_regions_are_compared_once_and_for_a_few_seconds_at_a_time(

@@ -128,7 +128,7 @@ function Library({ model, known }: { model: SceneModel; known: number }) {
                   <summary>{graph.gaps.length} {graph.gaps.length === 1 ? "gap" : "gaps"} between components</summary>
                   <ul>
                     {graph.gaps.map((gap) => (
-                      <li key={`${gap.a} ${gap.b}`}>{gap.distance.toPrecision(3)} in s between {gap.a.slice(0, 8)} and {gap.b.slice(0, 8)}: <Advice scene={model.scene} q={gap.q} onLook={setQ} /></li>
+                      <li key={`${gap.a} ${gap.b}`}>{gap.distance.toPrecision(3)} in s between {gap.a.slice(0, 8)} and {gap.b.slice(0, 8)}: {gap.map ? "the map proves the straight motion across it" : <Advice scene={model.scene} q={gap.q} onLook={setQ} />}</li>
                     ))}
                   </ul>
                 </details>
