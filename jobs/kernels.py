@@ -8,6 +8,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
+from certifier.compiled import forget_stale
 from certifier.jobs import kernels
 
 CHILDREN = ("certifier.seeding.propose", "planner.sampling.child")
@@ -15,11 +16,12 @@ CHILDREN = ("certifier.seeding.propose", "planner.sampling.child")
 
 
 def compile_all() -> None:
-    """Compiles what is not compiled yet.
+    """Compiles what is not compiled yet, or was compiled of other sources.
 
     Raises:
         subprocess.CalledProcessError: a child has failed.
     """
+    forget_stale()
     kernels.warm_up()
     for module in CHILDREN:
         subprocess.run([sys.executable, "-P", "-c", f"import {module} as module; module.warm_up()"], check=True)
