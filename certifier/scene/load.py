@@ -61,8 +61,9 @@ def read_in_child(
         raise
     except CirisError as death:
         message = f"reading the models of {name} failed: {death.message}"
-        hint = "look for files that include themselves, broken shapes or meshes, and meshes that take long to decompose"
-        if death.code == "child_timeout":
-            hint += "; or try again when the machine has less to do"
+        hint = (
+            "look for files that include themselves, broken shapes or meshes, and meshes that take long to decompose; where time ran out, "
+            "try again when the machine has less to do"
+        )
         raise SceneError("scene_model_crash", message, field="directives", hint=hint) from None
     return document

@@ -17,7 +17,7 @@ def main(directory: str, url: str, bundle: str) -> None:
     from ciris_client.api.planning import contains
     from ciris_client.api.regions import download_region_proof, get_region, list_regions, verify_region
     from ciris_client.api.scenes import create_scene, get_scene
-    from ciris_client.models import BodyCreateScene, ContainsRequest, GrowOptions, GrowRequest, Job, JobState, Problem, Seed
+    from ciris_client.models import AcceptedJob, BodyCreateScene, ContainsRequest, GrowOptions, GrowRequest, JobState, Problem, Seed
     from ciris_client.types import File
 
     client = Client(base_url=url)
@@ -28,7 +28,7 @@ def main(directory: str, url: str, bundle: str) -> None:
     assert unknown.code == "scene_not_found"
     request = GrowRequest(kind="grow", scene=scene.id, seed=Seed(q=[0.4, 0.3]), options=GrowOptions(stages=1))
     job = create_job.sync(client=client, body=request)
-    assert isinstance(job, Job)
+    assert isinstance(job, AcceptedJob)
     until = time.monotonic() + 120
     while not job.ended and time.monotonic() < until:
         time.sleep(0.2)

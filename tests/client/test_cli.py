@@ -72,7 +72,7 @@ def files(tmp_path: Path) -> Path:
     write(tmp_path / "nothing.npz", A=C)
     write(tmp_path / "pickled.npz", C=np.array([object()], dtype=object), d=d)
     (tmp_path / "text.npz").write_text("no zip")
-    (tmp_path / "broken.yaml").write_text("directives: [")
+    (tmp_path / "broken.yaml").write_text("name: arm\ndirectives: {]")
     return tmp_path
 
 
@@ -90,7 +90,7 @@ def files(tmp_path: Path) -> Path:
         (("certify", "planar-2dof", "--polytope", "small.npz"), "is not a scene file"),
         (("grow", "nowhere.yaml", "--q", "0,0"), "nowhere.yaml"),
         (("grow", "nowhere.yaml"), "there is no scene file nowhere.yaml"),
-        (("grow", "broken.yaml", "--q", "0,0"), "broken.yaml, line 1"),
+        (("grow", "broken.yaml", "--q", "0,0"), "broken.yaml, line 2"),
         (("grow", "broken.yaml"), "--q: no seed was given"),
         (("grow", PLANAR, "--q", "0,nan"), "--q[1]: 'nan' is not a finite number"),
         (("grow", PLANAR, "--q", "0"), "2 joints"),
