@@ -144,10 +144,11 @@ def _only_scene(root: Path) -> str:
     found = list(root.rglob(SCENE_FILE)) or list(root.rglob("*.yaml"))
     if not found:
         found = next((some for kind in MODELS if (some := list(root.rglob(f"*{kind}")))), [])
+    if not found and any(root.rglob("*.xacro")):
+        hint = "expand the xacro to a .urdf, or use `ciris scene init` and `ciris scene add`, which expand it"
+        raise SceneError("bundle_zip", "the zip has no scene file, and no model of a robot but in xacro", field="bundle", hint=hint)
     if not found:
         hint = f"add a {SCENE_FILE}, or a robot's model: {', '.join(MODELS)}"
-        if any(root.rglob("*.xacro")):
-            hint = "expand the xacro to a .urdf, or use `ciris scene init` and `ciris scene add`, which expand it"
         raise SceneError("bundle_zip", "the zip has no scene file, and no model of a robot", field="bundle", hint=hint)
     if len(found) > 1:
         names = sorted(escaped(file.name)[:60] for file in found)

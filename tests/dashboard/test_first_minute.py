@@ -120,7 +120,7 @@ def test_two_robots_without_a_scene_are_refused(client: TestClient, tmp_path: Pa
 def test_a_zip_with_nothing_but_xacro_says_who_expands_it(client: TestClient, tmp_path: Path) -> None:
     (tmp_path / "arm.urdf.xacro").write_text("<robot/>")
     answer = client.post("/v1/scenes", files={"bundle": ("arm.zip", zipped(tmp_path), "application/zip")}).json()
-    assert answer["detail"] == "the zip has no scene file, and no model of a robot"
+    assert answer["detail"] == "the zip has no scene file, and no model of a robot but in xacro"
     assert "`ciris scene init`" in answer["hint"]
 
 

@@ -37,6 +37,11 @@ BUNDLES: Table = {
         lambda t: t.stranger(arm__urdf="<robot><mesh filename='../m.obj'/></robot>"),
     ],
     ("bundle_xml", ""): [lambda t: t.stranger(arm__urdf="<a>" * 60 + "</a>" * 60)],
-    ("bundle_zip", "bundle"): [lambda t: load_bundle(b"not a zip"), lambda t: t.unpack(("a/scene.yaml", ""), ("b/scene.yaml", ""))],
+    ("bundle_zip", "bundle"): [
+        lambda t: load_bundle(b"not a zip"),
+        lambda t: t.unpack(("a/scene.yaml", ""), ("b/scene.yaml", "")),
+        lambda t: t.unpack(("LICENSE", "all")),
+        lambda t: t.unpack(("arm.urdf.xacro", "<robot/>")),
+    ],
     ("bundle_path", "bundle"): [lambda t: t.unpack(link()), lambda t: t.unpack(("../evil", "")), lambda t: t.unpack(("a/" * 40 + "b", ""))],
 }

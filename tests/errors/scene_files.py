@@ -23,6 +23,7 @@ SCENE_FILES: Table = {
         lambda t: t.load("#" * (2**20 + 1)),
         lambda t: t.load(b"\xff\xfename"),
         lambda t: t.load("# a\u2028b\n" + D),
+        lambda t: t.load("# a\n\ufeff" + D),
         lambda t: t.load("[" * 60 + "]" * 60),
         lambda t: t.load("name: [unclosed\n" + D),
         lambda t: t.load("name: \x07\n"),
