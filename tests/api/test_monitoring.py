@@ -10,7 +10,7 @@ import pytest
 import yaml
 from fastapi.testclient import TestClient
 
-from tests.api.test_metrics import samples
+from tests.api.test_metrics import counted
 
 DEPLOY = Path(__file__).parents[2] / "deploy" / "monitoring"
 SELECTOR = re.compile(r"(ciris_\w+)(?:\{([^}]*)\})?")
@@ -30,7 +30,7 @@ def served(client: TestClient, region: str) -> dict[str, list[dict[str, str]]]:
     """The labels of every sample, by the metric's name, after a job has ended and a few requests were answered."""
     client.get("/v1/nothing")
     found: dict[str, list[dict[str, str]]] = {}
-    for sample in samples(client.get("/metrics").text):
+    for sample in counted(client):
         name, _, labels = sample.partition("{")
         found.setdefault(name, []).append(dict(re.findall(r'(\w+)="([^"]*)"', labels)))
     return found

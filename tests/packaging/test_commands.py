@@ -69,7 +69,7 @@ def test_a_current_environment_is_left_alone(copy: Path, tools: Path) -> None:
     for name in ("runtime", "test"):
         (copy / f".venv/{name}.stamp").write_text(stamp(copy, name))
     done = run(["./start", "--once"], copy, str(tools))
-    assert (done.returncode, done.stdout, done.stderr) == (0, "-P -m client.demo --once\n", "")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "-P -m certifier.compiled\n-P -m client.demo --once\n", "")
 
 
 @pytest.mark.parametrize(("set_to", "seen"), [(None, "true"), ("", "true"), ("1", "1")])
