@@ -5,10 +5,12 @@ So a Redis that is slow or away does not occupy the threads that answer requests
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Annotated
 
 from anyio import CapacityLimiter, to_thread
-from fastapi import Depends, Request
+from fastapi import BackgroundTasks, Depends, Request
 
 from workers.app import send_coordinate
 
@@ -28,9 +30,10 @@ class Announcer:
             await to_thread.run_sync(send_coordinate, job_id, limiter=self._limiter)
 
 
-async def _announcer(request: Request) -> Announcer:
+async def _announcing(request: Request, background: BackgroundTasks) -> Callable[[str], None]:
     announcer: Announcer = request.app.state.announcer
-    return announcer
+    return partial(background.add_task, announcer.announce)
 
 
-Announcements = Annotated[Announcer, Depends(_announcer)]
+Announce = Annotated[Callable[[str], None], Depends(_announcing)]
+"""Has the job with this id announced, once the route has answered."""

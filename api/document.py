@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 from functools import cache
 from http import HTTPStatus
@@ -21,8 +20,6 @@ from api.problems import Problem
 
 EXAMPLES = Path(__file__).with_name("examples.json")
 UPLOAD = "Body_create_scene"
-OF_PARENT = {"AcceptedJob": "Job"}
-"""Fields of the first have examples of the second where they have none of their own: a job that was asked for now has no outcome."""
 
 ANYWHERE = ("unknown_host", "too_many_requests", "internal")
 WITH_KEY = ("key_needed", "scope_missing", "database_unavailable")
@@ -168,10 +165,8 @@ def _add_examples(schemas: dict[str, Any]) -> None:
         example = _examples()["schemas"].get(name)
         if example is not None:
             schema.setdefault("examples", [example])
-        names = (name, OF_PARENT.get(name, name))
         for field, described in schema.get("properties", {}).items():
-            known = ((_examples()["schemas"].get(one, {}).get(field), _examples()["fields"].get(f"{one}.{field}")) for one in names)
-            values = [*itertools.chain.from_iterable(known), described.get("default")]
+            values = [(example or {}).get(field), _examples()["fields"].get(f"{name}.{field}"), described.get("default")]
             described.setdefault("examples", [next((value for value in values if value is not None), None)])
     schemas[UPLOAD]["properties"]["bundle"]["examples"] = ["(the bytes of scene.zip)"]
     schemas[UPLOAD]["description"] = "Holds the upload of a scene, as multipart/form-data with one part, `bundle`."

@@ -11,12 +11,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Annotated
 
-from fastapi import APIRouter, BackgroundTasks, Header, Query, Response, status
+from fastapi import APIRouter, Header, Query, Response, status
 from pydantic import Field
 
 from api import held, submission, timeline
 from api.access import READ, SUBMIT, Admin, Db, Submitter
-from api.announce import Announcements
+from api.announce import Announce
 from api.delivery import unchanging
 from api.reading import ReadingRoute
 from api.room import KeptRoom
@@ -91,8 +91,7 @@ def create_job(
     caller: Submitter,
     db: Db,
     response: Response,
-    background: BackgroundTasks,
-    announcements: Announcements,
+    announce: Announce,
     room: KeptRoom,
     idempotency_key: IdempotencyKey = None,
 ) -> AcceptedJob:
@@ -105,7 +104,7 @@ def create_job(
     with db.write() as session:
         job, made = submission.submit(session, asked, caller, idempotency_key)
     if made:
-        background.add_task(announcements.announce, job.id)
+        announce(job.id)
     else:
         response.status_code = status.HTTP_200_OK
     response.headers["Location"] = f"/v1/jobs/{job.id}"
@@ -118,8 +117,7 @@ def create_jobs(
     body: NewJobs,
     caller: Submitter,
     db: Db,
-    background: BackgroundTasks,
-    announcements: Announcements,
+    announce: Announce,
     room: KeptRoom,
     idempotency_key: IdempotencyKey = None,
 ) -> AcceptedJobs:
@@ -134,7 +132,7 @@ def create_jobs(
         made = submission.submit_all(session, asked, caller, idempotency_key)
     for job, new in made:
         if new:
-            background.add_task(announcements.announce, job.id)
+            announce(job.id)
     return AcceptedJobs(jobs=_accepted(described(db, [job for job, _ in made]), asked))
 
 
@@ -144,7 +142,7 @@ def _accepted(made: Sequence[Job], asked: Sequence[submission.Checked]) -> list[
 
 @router.post("/cancel", dependencies=[SUBMIT], status_code=status.HTTP_202_ACCEPTED)
 @writing
-def cancel_jobs(body: CancelRequest, db: Db, background: BackgroundTasks, announcements: Announcements) -> JobList:
+def cancel_jobs(body: CancelRequest, db: Db, announce: Announce) -> JobList:
     """Asks several jobs to end: those named, or those with all of the labels that have not ended. Regions certified before remain.
 
     With labels, at most 100 are cancelled. Ask again until the answer is empty.
@@ -156,7 +154,7 @@ def cancel_jobs(body: CancelRequest, db: Db, background: BackgroundTasks, announ
     for job_id in ids:  # one transaction each, so that no worker waits for the lock of all
         with db.write() as session:
             cancelled.append(jobs.cancel(session, job_id))
-        background.add_task(announcements.announce, job_id)
+        announce(job_id)
     return JobList(jobs=described(db, cancelled))
 
 
@@ -229,14 +227,14 @@ def delete_job(job_id: JobGiven, caller: Admin, db: Db, dependents: WithDependen
 
 @router.post("/{job_id}/cancel", dependencies=[SUBMIT], status_code=status.HTTP_202_ACCEPTED)
 @writing
-def cancel_job(job_id: JobGiven, db: Db, background: BackgroundTasks, announcements: Announcements) -> Job:
+def cancel_job(job_id: JobGiven, db: Db, announce: Announce) -> Job:
     """Asks a job to end. Regions that were certified before remain.
 
     Nothing happens to a job that has ended.
     """
     with db.write() as session:
         job = jobs.cancel(session, job_id)
-    background.add_task(announcements.announce, job.id)
+    announce(job.id)
     return described(db, [job])[0]
 
 
@@ -247,8 +245,7 @@ def retry_job(
     caller: Submitter,
     db: Db,
     response: Response,
-    background: BackgroundTasks,
-    announcements: Announcements,
+    announce: Announce,
     room: KeptRoom,
 ) -> Job:
     """Creates a new job like one that failed or was cancelled.
@@ -258,7 +255,7 @@ def retry_job(
     room.check(db, caller.project)
     with db.write() as session:
         job = jobs.retry(session, job_id, caller.key_id)
-    background.add_task(announcements.announce, job.id)
+    announce(job.id)
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return described(db, [job])[0]
 

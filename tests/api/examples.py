@@ -37,18 +37,21 @@ CERTAIN = {
     "nearest": {"a": "arm/upper/bar", "b": "world/post", "piece": 0, "time": 0.25, "q": [0.4, 0.3], "distance": 0.0142},
 }
 """A motion that is certified has these."""
+JOB = {
+    "error": {"code": "seed_in_collision", "message": "arm/upper/bar and world/post touch at the seed", "field": "seed.q", "hint": ""},
+    "retry_of": "1f9b2a7c-5b0e-4b58-9c39-2f1d6a3c8e10",
+    "parent": "5d0c1e42-0f7a-4a39-8a0e-6b1f1a9f2c11",
+    "trace": "0af7651916cd43dd8448eb211c80319c",
+}
+"""A job that another one has asked for, that was tried again, and that went wrong has these."""
 SELDOM: dict[str, dict[str, Any]] = {
     "IgnoredPair": {**PAIR, "reason": "neighbours: the joint between them always overlaps"},
     "UncoveredBodies": {"why": "ignored", "reason": "they are bolted together"},
     "Substitution": {"geometry": "arm/flange/disc", "substitution": "a capsule around a cylinder", "inflation": 0.003},
     "AuditPage": {"next": "MjAyNi0wNS0wMVQwODowMDowMCswMDowMCA1ZDBj"},
     "DrawnGeometry": {"substitution": "a capsule around a cylinder"},
-    "Job": {
-        "error": {"code": "seed_in_collision", "message": "arm/upper/bar and world/post touch at the seed", "field": "seed.q", "hint": ""},
-        "retry_of": "1f9b2a7c-5b0e-4b58-9c39-2f1d6a3c8e10",
-        "parent": "5d0c1e42-0f7a-4a39-8a0e-6b1f1a9f2c11",
-        "trace": "0af7651916cd43dd8448eb211c80319c",
-    },
+    "Job": JOB,
+    "AcceptedJob": JOB,
     "HeldWork": {"job": "1f9b2a7c-5b0e-4b58-9c39-2f1d6a3c8e10"},
     "JobMotion": CERTAIN,
     "KeyPage": {"next": "MjAyNi0wNS0wMVQwODowMDowMCswMDowMCA1ZDBj"},
@@ -163,8 +166,9 @@ class Recorder:
         self.client, self.document = client, client.get("/openapi.json").json()
         self.collected = Collected(self.document)
 
-    def ask(self, method: str, route: str, body: Any = None, params: Any = None, **ids: Any) -> Any:
+    def ask(self, method: str, route: str, body: Any = None, params: Any = None, once: str | None = None, **ids: Any) -> Any:
         headers = {"Authorization": f"Bearer {self.key}"} if hasattr(self, "key") else {}
+        headers |= {} if once is None else {"Idempotency-Key": once}
         options = {"files": body} if isinstance(body, dict) and "bundle" in body else {"json": body} if body is not None else {}
         answer = self.client.request(method, route.format(**ids), params=params, headers=headers, **options)
         operation = self.document["paths"][route][method.lower()]
@@ -204,7 +208,8 @@ def record(client: TestClient, database: Database) -> dict[str, Any]:
     name, home, away = scene["name"], [0.4, 0.3], [0.6, 0.5]
     hook = {"url": "https://planner.example.org/ciris", "secret": "whsec_AAECAwQFBgcICQoLDA0ODxAREhMUFRYXGBkaGxwdHh8="}
     seed = {"kind": "grow", "scene": name, "seed": {"q": home}, "options": {"stages": 1}, "labels": {"team": "welding"}}
-    grown = service.ended(ask("POST", "/v1/jobs", {**seed, "webhook": hook}))
+    grown = service.ended(ask("POST", "/v1/jobs", {**seed, "webhook": hook}, once="cell-7"))
+    ask("POST", "/v1/jobs", {**seed, "webhook": hook}, once="cell-7")  # the answer has the outcome then
     certify = {"kind": "certify", "scene": name, "polytope": {"C": [[1, 0], [-1, 0], [0, 1], [0, -1]], "d": [0.3, -0.1, 0.3, -0.1]}}
     service.ended(ask("POST", "/v1/jobs", certify))
     wide = {**certify, "polytope": {"C": [[1, 0]], "d": [2.0]}, "cells": 20}

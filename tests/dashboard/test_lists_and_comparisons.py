@@ -73,7 +73,7 @@ def test_two_jobs_are_compared(page: Any, url: str, client: TestClient, database
 
 
 def covering(database: Database, *looks: tuple[float, int]) -> str:
-    """A cover that ran, and saw these shares covered by so many regions."""
+    """A cover that ran. At each look, this share was covered, by this number of regions."""
     with database.write() as session:
         job, _ = jobs.create(
             session, kind="cover", scene_id=scenes.get(session, "slider").id, options=CoverOptions.from_document({}).to_document()

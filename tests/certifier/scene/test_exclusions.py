@@ -1,4 +1,4 @@
-"""Conditions that no configuration keeps are told as warnings of the scene."""
+"""A scene has a warning about conditions that no configuration keeps."""
 
 from __future__ import annotations
 
