@@ -6,7 +6,6 @@ So a Redis that is slow or away does not occupy the threads that answer requests
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Annotated
 
 from anyio import CapacityLimiter, to_thread
@@ -32,7 +31,7 @@ class Announcer:
 
 async def _announcing(request: Request, background: BackgroundTasks) -> Callable[[str], None]:
     announcer: Announcer = request.app.state.announcer
-    return partial(background.add_task, announcer.announce)
+    return lambda job_id: background.add_task(announcer.announce, job_id)
 
 
 Announce = Annotated[Callable[[str], None], Depends(_announcing)]
