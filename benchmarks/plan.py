@@ -56,9 +56,9 @@ def motions(name: str, url: str | None, queries: int, points: int, progress: Pro
     file = name if is_scene_file(name) else str(catalogue.FILES[name])
     scene, rng = load_scene(file), np.random.default_rng(0)
     rival = Ompl(scene)
-    pairs = _questions(scene, queries, rng)
-    narrow = _tasks(scene, name, rng)
     with service.connect(url) as client:
+        pairs = _questions(scene, queries, rng)
+        narrow = _tasks(scene, name, rng)
         asked = Service(client)
         known = asked.add_scene(file)
         begin = time.perf_counter()
