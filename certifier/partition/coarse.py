@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from certifier.kinematics import Kinematics, rigid_inverse
 from certifier.model import WORLD, Array, Geometry, JointKind, Volume
@@ -61,34 +62,42 @@ class _Linkage:
             return None
         return cls(names[0], axes, poses, _placed(fixed, geometry.vertices), geometry.radius)
 
-    def reach(self) -> tuple[float, Array]:
-        """Returns the way from the geometry's outside over the axes to the last point before the first joint's axis, and this point.
+    def reach(self) -> tuple[float, Array, int]:
+        """Returns how far the geometry reaches from points that a joint turns, these points, and the number of this joint: 0 or 1.
 
-        Where only one joint is between, the way is the radius alone, and the points, (V, 3), are the vertices; else it is one point,
-        (1, 3). They are in the first joint's frame.
+        The points are in the joint's frame, (V, 3): the vertices or one point, about which a ball holds the geometry at all angles of the
+        joints behind this one.
         """
-        reach, points = self.radius, self.vertices
-        for i in reversed(range(1, len(self.axes))):
-            pose = self.poses[i]
-            t = foot((pose[:3, :3] @ self.axes[i]).tolist(), (-pose[:3, 3]).tolist(), self.axes[i - 1].tolist())
-            e = (_along(points, self.axes[i]) if t is None else t) * self.axes[i]
-            reach += _farthest(points, e)
-            points = _placed(pose, e[None])
-        return reach, points
+        reach, points, i = self.radius, self.vertices, len(self.axes) - 1
+        while i > 1:
+            pose = self.poses[i - 1]
+            t = foot((pose[:3, :3] @ self.axes[i - 1]).tolist(), (-pose[:3, 3]).tolist(), self.axes[i - 2].tolist())
+            if t is None:
+                t = _along(_placed(self.poses[i], np.outer(points @ self.axes[i], self.axes[i])), self.axes[i - 1])
+            e = t * self.axes[i - 1]
+            reach += self._turned(points, i, e)
+            points, i = _placed(pose, e[None]), i - 2
+        return reach, points, i
 
-    def on_first_axis(self, points: Array) -> float:
-        """Returns where on the first joint's axis a ball's centre is best, for the points that :meth:`reach` gives."""
-        t = None
-        if len(self.axes) > 1:
-            pose = self.poses[1]
-            t = foot(self.axes[0].tolist(), pose[:3, 3].tolist(), (pose[:3, :3] @ self.axes[1]).tolist())
-        return _along(points, self.axes[0]) if t is None else t
+    def to_first_axis(self, points: Array, i: int, t: float) -> float:
+        """Returns how far points that joint i turns, 0 or 1, come from the point t on the first joint's axis at most."""
+        if i == 0:
+            return _farthest(points, t * self.axes[0])
+        return self._turned(points, i, t * self.axes[0])
+
+    def _turned(self, points: Array, i: int, other: Array) -> float:
+        """Returns how far points that joint i turns come at most from one that it does not move, (3,) in the frame of the joint before."""
+        axis, pose = self.axes[i], self.poses[i]
+        offset = pose[:3, :3].T @ (other - pose[:3, 3])
+        g, h = float(offset @ axis), points @ axis
+        sigma, rho = np.linalg.norm(offset - g * axis), np.linalg.norm(points - np.outer(h, axis), axis=1)
+        return float(np.sqrt((h - g) ** 2 + (rho + sigma) ** 2).max())
 
 
 def ball(kinematics: Kinematics, geometries: Sequence[Geometry], body: str) -> Volume | None:
     """Returns a ball fixed to a body that holds geometries at all angles of the joints between.
 
-    Its centre is on the axis of the joint next to the body: where this axis is nearest to the next one, or next to the geometries.
+    Its centre is on the axis of the joint next to the body, where the ball has the least radius.
 
     Returns:
         None if a geometry is fixed to the body, or not all are behind the same joint of it, or one is behind a joint that slides.
@@ -97,12 +106,15 @@ def ball(kinematics: Kinematics, geometries: Sequence[Geometry], body: str) -> V
     known = [linkage for linkage in linkages if linkage is not None]
     if len(known) < len(linkages) or len({linkage.first for linkage in known}) != 1:
         return None
-    reaches = [linkage.reach() for linkage in known]
-    t = np.mean([linkage.on_first_axis(points) for linkage, (_, points) in zip(known, reaches, strict=True)])
+    reaches = [(linkage, *linkage.reach()) for linkage in known]
+
+    def radius(t: float) -> float:
+        return max(reach + linkage.to_first_axis(points, i, t) for linkage, reach, points, i in reaches)
+
+    t = minimize_scalar(radius).x  # convex: it is the largest of distances from points on circles
     center = t * known[0].axes[0]
-    radius = max(reach + _farthest(points, center) for reach, points in reaches)
     names = tuple(geometry.name for geometry in geometries)
-    return Volume(names, body, _placed(known[0].poses[0], center[None]), _enlarged(radius))
+    return Volume(names, body, _placed(known[0].poses[0], center[None]), _enlarged(radius(t)))
 
 
 def capsule(kinematics: Kinematics, geometries: Sequence[Geometry]) -> Volume | None:

@@ -3,13 +3,16 @@
 A coarse volume is a ball or a capsule that is fixed to a body B, not to the bodies D of its geometries (certifier.proof.partition). Between
 B and D there are revolute joints and welds. Turning a joint moves no point of its axis and keeps the distances from such a point.
 
-Ball. Let e_1 be a point of the axis of the joint next to D, e_2 of the next axis towards B, up to e_m. e_i and e_(i+1) are both fixed to
-the body between their joints, every vertex v of the geometry and e_1 are to D, and e_m and the centre c are to B. So at all angles
+Ball. A joint takes a point p about its axis, on a circle. Let h be where p is along the axis, and rho its distance from it; let g and sigma
+say the same of a point e that the joint does not move. Then the farthest that p comes from e is the root of
 
-    |v - c|  <=  |v - e_1| + |e_1 - e_2| + ... + |e_m - c|,   all of which are constant.
+    (h - g)^2 + (rho + sigma)^2.
 
-The geometry with the radius r is contained if this and r are at most the ball's radius. Any points on the axes will do. :func:`foot` says
-which are taken.
+Let e be on the axis of the next joint towards B. A ball about e that holds all the circles stays where it is when that joint turns, too.
+Only the joint after that one moves e, on another circle. So with every second joint the way from a vertex v to the centre c grows by one
+such root: the last one leads to c, or to the point next to it on the axis next to B, where the distance to c is added. The geometry with
+the radius r is contained if this way and r are at most the ball's radius. Any points on the axes will do. :func:`foot` says which are
+taken.
 
 Capsule, with one joint between. Let its ends be at most delta away from the points x and y of the joint's axis. The distance of v to the
 segment from x to y does not change, and every point of this segment is at most delta away from the segment between the ends. So v is
@@ -44,8 +47,7 @@ def foot(axis: Sequence[float], point: Sequence[float], direction: Sequence[floa
         direction: unit vector of the other line.
 
     Returns:
-        t in metres; None for lines that are about parallel, where e is the point of the axis that is nearest to the one before it: to the
-        mean of the geometry's vertices for the joint next to the geometry, to the last joint's point for any other.
+        t in metres; None for lines that are about parallel, where e is next to the middles of the circles about it, in the mean.
     """
     pairs = (axis, direction), (point, axis), (point, direction)
     cosine, along, other = (sum(x * y for x, y in zip(a, b, strict=True)) for a, b in pairs)
@@ -90,18 +92,45 @@ def _reach_of_ball(axes: Sequence[Point], poses: Sequence[Numbers], vertices: Se
         vertices: in the last joint's frame.
         center: in the volume's body's frame.
     """
-    reach, points = fmpq(0), vertices
-    for i in reversed(range(len(axes))):
-        origin, direction = _line(poses[i], axes[i])
-        if i == 0:
-            t = _double(dot(minus(center, origin), direction))
-        else:
-            found = foot(_doubles(direction), [-x for x in _doubles(origin)], _doubles(axes[i - 1]))
-            t = sum(_double(dot(p, axes[i])) for p in points) / len(points) if found is None else found
-        e = tuple(exact(t) * x for x in axes[i])
-        reach += _largest_distance(points, e)
-        points = [placed(poses[i], e)]
-    return reach + _largest_distance(points, center)
+    reach, points, i = fmpq(0), vertices, len(axes) - 1
+    while i > 0:
+        e = _scaled(exact(_on_axis(axes, poses, points, center, i - 1)), axes[i - 1])
+        reach += _farthest_turned(points, axes[i], _line(poses[i], axes[i]), e)
+        points, i = [placed(poses[i - 1], e)], i - 2
+        if i >= 0:
+            continue
+        return reach + _root(_square(minus(points[0], center)))
+    return reach + _farthest_turned(points, axes[0], _line(poses[0], axes[0]), center)
+
+
+def _on_axis(axes: Sequence[Point], poses: Sequence[Numbers], points: Sequence[Point], center: Point, i: int) -> float:
+    """Returns where on the axis of joint i a ball about points that joint i + 1 turns has its centre."""
+    origin, direction = _line(poses[i], axes[i])
+    if i == 0:
+        return _double(dot(minus(center, origin), direction))
+    t = foot(_doubles(direction), [-x for x in _doubles(origin)], _doubles(axes[i - 1]))
+    if t is not None:
+        return t
+    middles = [placed(poses[i + 1], _scaled(dot(p, axes[i + 1]), axes[i + 1])) for p in points]
+    return sum(_double(dot(p, axes[i])) for p in middles) / len(middles)
+
+
+def _farthest_turned(points: Sequence[Point], axis: Point, line: tuple[Point, Point], other: Point) -> fmpq:
+    """Returns how far points come from another one at most when a joint turns them.
+
+    Args:
+        axis: the joint's, in the frame of the points.
+        line: a point and the direction of the same axis, in the frame of ``other``.
+    """
+    offset = minus(other, line[0])
+    g = dot(offset, line[1])
+    sigma = _square(offset) - g * g
+    squares = []
+    for p in points:
+        h = dot(p, axis)
+        rho = _square(p) - h * h
+        squares.append((h - g) * (h - g) + rho + sigma + 2 * _root(rho * sigma))
+    return _root(max(squares))
 
 
 def _reach_of_capsule(axis: Point, pose: Numbers, vertices: Sequence[Point], ends: Sequence[Point]) -> fmpq:
@@ -125,10 +154,6 @@ def _line(pose: Numbers, axis: Point) -> tuple[Point, Point]:
     """Returns the origin of a frame and the direction of an axis of it, in the frame in which the pose is."""
     origin = placed(pose, (fmpq(0),) * 3)
     return origin, minus(placed(pose, axis), origin)
-
-
-def _largest_distance(points: Sequence[Point], other: Point) -> fmpq:
-    return _root(max(_square(minus(point, other)) for point in points))
 
 
 def _scaled(t: fmpq, a: Point) -> Point:

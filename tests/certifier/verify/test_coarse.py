@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from certifier.errors import ProofError
@@ -93,6 +93,26 @@ def test_what_is_made_holds_and_not_with_a_smaller_radius(seed):
             assert not holds(scene, replace(volume, radius=volume.radius * (1 - 1e-6)))
 
 
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10_000), st.integers(0, 10_000))
+def test_the_ball_of_one_or_two_joints_is_the_least_about_its_axis(seed, place):
+    """The oracle turns both joints through a grid of angles, and tries other centres on the axis next to the ball's body."""
+    scene = tree(seed)
+    kinematics, rng = Kinematics.of(scene), np.random.default_rng(place)
+    ways = [(g, body) for g in scene.geometries for body in kinematics.ancestors(g.body) if 1 <= len(kinematics.chain(body, g.body)) <= 2]
+    ways = [(g, body) for g, body in ways if ball(kinematics, [g], body) is not None]
+    assume(ways)
+    geometry, body = ways[rng.integers(len(ways))]
+    found, chain = ball(kinematics, [geometry], body), kinematics.chain(body, geometry.body)
+    q = np.zeros((180 ** len(chain), scene.n))
+    q[:, chain] = np.stack(np.meshgrid(*[np.linspace(-np.pi, np.pi, 180, endpoint=False) + 1e-3] * len(chain)), axis=-1).reshape(len(q), -1)
+    points = kinematics.points(body, geometry.body, geometry.vertices, np.tan((q - scene.q_star) / 2)).reshape(-1, 3)
+    reached = np.linalg.norm(points - found.vertices[0], axis=1).max() + geometry.radius
+    assert found.radius == pytest.approx(reached, rel=2e-3)
+    away = rng.normal(size=3) * 10.0 ** rng.uniform(-2, 0)
+    assert np.linalg.norm(points - found.vertices[0] - away, axis=1).max() + geometry.radius > found.radius * (1 - 2e-3)
+
+
 @pytest.mark.parametrize("name", sorted(path.parent.name for path in EXAMPLES.glob("*/scene.yaml")))
 def test_what_is_made_of_the_examples_holds(name):
     scene = load_scene(EXAMPLES / name / "scene.yaml")
@@ -146,9 +166,9 @@ def bar(vertices, body: str, radius: float) -> Volume:
     [
         ([[1.0, 0.0, 0.0]], "arm/link1", np.sqrt(1.005)),
         ([[1.0, 0.0, 0.05]], "arm/link1", np.sqrt(1.0125)),
-        ([[1.0, 0.3, 0.0]], "arm/link1", np.sqrt(1.005) + 0.3),
-        ([[0.0, 0.0, 0.0]], WORLD, np.sqrt(1.005) + 1.0),
-        ([[0.0, 0.0, 0.4]], WORLD, np.sqrt(1.005) + np.hypot(1.0, 0.4)),
+        ([[1.0, 0.3, 0.0]], "arm/link1", np.hypot(np.sqrt(1.0025) + 0.3, 0.05)),
+        ([[0.0, 0.0, 0.0]], WORLD, np.hypot(np.sqrt(1.0025) + 1.0, 0.05)),
+        ([[0.0, 0.0, 0.4]], WORLD, np.hypot(np.sqrt(1.0025) + 1.0, 0.45)),
         ([[1.0, 0.0, -0.05], [1.0, 0.0, 0.05]], "arm/link1", np.sqrt(1.0025)),
         ([[1.0, 0.0, 0.05], [1.0, 0.0, -0.05]], "arm/link1", np.sqrt(1.0025)),
         ([[1.0, 0.0, 0.0], [1.0, 0.0, 0.05]], "arm/link1", np.sqrt(1.005)),
@@ -196,9 +216,8 @@ def test_axes_that_meet_cost_nothing(body):
     assert holds(scene, Volume(names[1:], body, center, 0.45 + 1e-12))
     found = ball(Kinematics.of(scene), scene.geometries, body)
     assert found is not None
-    height, radius = (0.2, np.hypot(0.4, 0.2) + 0.1) if body == "arm/b" else (0.0, 0.5)  # one joint: the centre is beside the geometries
-    assert found.radius == pytest.approx(radius, abs=1e-8)
-    np.testing.assert_allclose(found.vertices, center + np.array([0.0, 0.0, height]), atol=1e-12)
+    assert found.radius == pytest.approx(0.5, abs=1e-8)
+    np.testing.assert_allclose(found.vertices, center, atol=1e-8)
 
 
 def test_a_volume_below_its_geometry_holds_it_as_well():

@@ -45,6 +45,7 @@ def wrist():
     scene = load_scene(EXAMPLES / "ur3e_bin" / "scene.yaml")
     q = np.array(yaml.safe_load((EXAMPLES / "ur3e_bin" / "seed.yaml").read_text())["q"])
     index = next(i for i, pair in enumerate(scene.pairs) if "wrist_3" in pair.a + pair.b and "tray/right" in pair.a + pair.b)
+    q[0] -= 0.2  # towards this side of the bin
     return scene, cube(scene, scene.to_s(q), 0.3), index
 
 
