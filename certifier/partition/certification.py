@@ -54,6 +54,8 @@ AROUND = 0.1
 """Open cells of hard pairs are cut off where the bodies are nearer than this, relative to their extent."""
 LOOKS_AGAIN = 8
 """Where cells stay open, this many searches for a contact follow the first one; one search misses contacts in a small corner."""
+LOOKING = 3
+"""So many parts of a round look for contacts in all of the polytope, each elsewhere."""
 MOST_POINTS = 2000
 """A result names at most this many configurations."""
 
@@ -136,7 +138,8 @@ class CellCertification:
         """
         start, volumes = time.perf_counter(), self._volumes(index)
         search = Search(self._area, self._shared, volumes, self._keep)
-        given, contacts = dealt(open_cells(left), part, parts), scouted(self._area, search.bodies, 1 + part)
+        given = dealt(open_cells(left), part, parts)
+        contacts = scouted(self._area, search.bodies, 1 + part) if part < LOOKING else []
         report = search.run(given, cells)
         result = self._left(search, volumes, given, replace(report, contacts=contacts + report.contacts), cut_off)
         return replace(result, seconds=time.perf_counter() - start)
@@ -203,7 +206,6 @@ class CellCertification:
     def _left(self, search: Search, volumes: Volumes, given: Sequence[OpenCell], report: Report, cut_off: CutOff) -> PairResult:
         """Returns the result of a pair that is not certified yet, with what its search has left."""
         left = Subtrees.of(given, len(self._area.ground.d))
-        cells = [(lower, upper) for _, lower, upper in left.open_cells]
         points = with_others(self._area, search.bodies, search.joints, report.contacts)
         contacts = min(len(points), MOST_POINTS)
         bodies = search.bodies
@@ -216,19 +218,19 @@ class CellCertification:
         joints = () if bodies is search.bodies else tuple(bodies.joints)
         weakness = Weakness(found, np.zeros(self._scene.n), contacts=contacts, joints=joints)
         streams = to_streams(left.roots, len(search.joints))
-        subtrees, outline = left.to_bytes(streams), self._outline(search, volumes, streams).to_bytes()
-        result = PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, subtrees=subtrees, outline=outline, open_cells=len(cells), weakness=weakness)
+        subtrees, outline, count = left.to_bytes(streams), self._outline(search, volumes, streams).to_bytes(), len(left.open_cells)
+        result = PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, subtrees=subtrees, outline=outline, open_cells=count, weakness=weakness)
         if report.contacts:
             return self._refuted(search, volumes, report.contacts[0], result)
         if report.narrow:
             s, distance = self._nearest(search, np.concatenate(report.narrow))
             detail = f"the padded bodies are {distance:.3g} m apart at the configuration named, too close for a plane"
             return replace(result, outcome=Outcome.TOO_CLOSE, witness_s=s, detail=detail)
-        if not cells:
+        if not count:
             return replace(result, detail="no cell is open; the cells are yet to be put together and verified")
-        inside = sum(((self._area.samples >= low) & (self._area.samples <= up)).all(axis=1).mean() for low, up in cells)
-        share = f"{100 * float(inside):.2g} %" if inside >= 1e-4 else "less than 0.01 %"
-        open_ = "1 cell is" if len(cells) == 1 else f"{len(cells)} cells are"
+        inside = report.left / len(self._area.samples)
+        share = f"{100 * inside:.2g} %" if inside >= 1e-4 else "less than 0.01 %"
+        open_ = "1 cell is" if count == 1 else f"{count} cells are"
         detail = f"{open_} open, with {share} of the polytope, as samples say; this round searched {report.cells}"
         return replace(result, detail=detail)
 
@@ -273,6 +275,8 @@ class CellCertification:
             cells = [cell for cell in cells if search.at_hand(cell.node) is bodies]
         within = NEAR if bodies is not search.bodies else AROUND if cut_off is CutOff.NEAR else np.inf
         for _, lower, upper in cells:
+            if len(found) >= MOST_POINTS:
+                break
             _, C, d = self._area.inside(lower, upper)
             middle, depth, _ = deepest(C, d, (lower + upper) / 2)
             if depth <= 0:

@@ -34,7 +34,7 @@ from certifier.partition.levels import MANY_JOINTS, Level, levels_of
 from certifier.partition.shared import Shared
 from certifier.partition.tree import Node, OpenCell, Streams
 from certifier.polytopes.simplex import deepest
-from certifier.proof.partition import EMPTY, PLANE, choices_of
+from certifier.proof.partition import EMPTY, OPEN, PLANE, choices_of
 
 NARROW = np.radians(3.0)
 """A cell that turns less than this in every joint is not cut any more."""
@@ -76,11 +76,13 @@ class Report:
         cells: how many cells were looked at.
         contacts: points (n,) at which the bodies touch.
         narrow: points (w, n) of each cell that is too narrow to be cut, or in which the bodies come too close.
+        left: how many samples of the polytope are in the cells that stay open.
     """
 
     cells: int = 0
     contacts: list[Array] = field(default_factory=list)
     narrow: list[Array] = field(default_factory=list)
+    left: int = 0
 
 
 class Search:
@@ -129,17 +131,20 @@ class Search:
             report.cells += 1
             cut = self._settle(cell, report)
             if cut is None:
+                report.left += len(cell.samples) if cell.node.kind == OPEN else 0
                 continue
             joint, points = cut
             narrow = self._turn(cell, self.bodies)[self.joints].max() * area.finer < NARROW
             value = None if narrow else self._middle_of(cell, joint)
             if value is None:
+                report.left += len(cell.samples)
                 report.narrow.append(points[:FEW])
                 continue
             halves = self._halves(cell, joint, value, points)
             cell.node.kind, cell.node.value, cell.node.children = joint, value, tuple(half.node for half in halves)
             for half in halves:
                 push(half)
+        report.left += sum(len(cell.samples) for _, _, cell in heap)
         return report
 
     def settle_as(self, cell: Cell, plane: Array | None, level: int) -> None:
