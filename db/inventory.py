@@ -15,6 +15,8 @@ from db.session import Database
 from db.states import ACCEPT, JOB, unfinished
 from db.types import utcnow
 
+Query = Select[*tuple[Any, ...]]
+
 
 @dataclass(frozen=True)
 class Contents:
@@ -54,25 +56,25 @@ def collect(database: Database) -> dict[str, Contents]:
     return found
 
 
-def _by_project(session: Session, query: Select[Any]) -> dict[str, tuple[Any, ...]]:
+def _by_project(session: Session, query: Query) -> dict[str, tuple[Any, ...]]:
     return {project: tuple(values) for project, *values in session.execute(query)}
 
 
-def _number(model: type[SceneRow] | type[RegionRow]) -> Select[Any]:
+def _number(model: type[SceneRow] | type[RegionRow]) -> Query:
     return select(model.project, func.count()).group_by(model.project)
 
 
-def _jobs() -> Select[Any]:
+def _jobs() -> Query:
     begun, counted = JobRow.claimed_at.is_not(None), (JobRow.state.in_(unfinished(JOB)), JobRow.parent_id.is_(None))
     numbers = (func.count().filter(begun), func.count().filter(~begun))
     return select(JobRow.project, *numbers).where(*counted).group_by(JobRow.project)
 
 
-def _keys() -> Select[Any]:
+def _keys() -> Query:
     valid = or_(ApiKeyRow.revoked_at.is_(None), ApiKeyRow.revoked_at > utcnow())
     return select(ApiKeyRow.project, func.count().filter(valid), func.max(ApiKeyRow.last_used_at)).group_by(ApiKeyRow.project)
 
 
-def _maps() -> Select[Any]:
+def _maps() -> Query:
     stored = (StepRow.kind == ACCEPT, StepRow.proof_digest.is_not(None))  # only maps have their proof with this step
     return select(JobRow.project, func.count()).join(StepRow, StepRow.job_id == JobRow.id).where(*stored).group_by(JobRow.project)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, BeforeValidator, Field
 
 from api.schemas.common import Page
 from db import projects, solver_time
@@ -16,11 +16,13 @@ from db.projects import MOST_BYTES, MOST_DAYS, MOST_SECONDS
 from db.states import WorkerState
 from db.workers import WorkerKind
 from jobs import patterns
-from jobs.fields import Real, Request, whole
+from jobs.fields import Real, Request, integer
 
 _BYTES = "The service refuses new scenes and jobs once the project stores this many bytes; null for no limit."
 _DAYS = "Days after a job's end when its data is deleted, except its regions; null for never."
 _SECONDS = "The service refuses new jobs once solvers have worked for the project this many seconds in a month; null for no limit."
+
+WholeBytes = Annotated[int, Field(ge=0, le=MOST_BYTES), BeforeValidator(integer)]
 
 
 class ProjectSummary(BaseModel):
@@ -43,9 +45,11 @@ class AnyProject(ProjectSummary):
     """Describes a project."""
 
     bytes: int = Field(description="Bytes of scenes, jobs, proofs and cells that the project stores, as of some seconds ago.")
-    month_ends_at: datetime = Field(
-        default_factory=solver_time.month_ends, description="When the next month begins, and `solver_seconds` is 0 again."
-    )
+    month_ends_at: datetime = Field(description="When the next month begins, and `solver_seconds` is 0 again.")
+
+    @classmethod
+    def of(cls, row: ProjectRow, solver_seconds: float, **more: Any) -> Self:
+        return super().of(row, solver_seconds, month_ends_at=solver_time.month_ends(), **more)
 
 
 class Project(AnyProject):
@@ -69,7 +73,7 @@ class NewProject(Request):
 class Limits(Request):
     """Sets limits of a project. Those that are left out stay; 0 or null takes one away."""
 
-    max_bytes: Annotated[whole(0, MOST_BYTES) | None, Field(description=_BYTES, examples=[50_000_000_000])] = None
+    max_bytes: Annotated[WholeBytes | None, Field(description=_BYTES, examples=[50_000_000_000])] = None
     keep_days: Annotated[Real | None, Field(ge=0, le=MOST_DAYS, description=_DAYS, examples=[30])] = None
     max_solver_seconds: Annotated[Real | None, Field(ge=0, le=MOST_SECONDS, description=_SECONDS, examples=[720_000])] = None
 

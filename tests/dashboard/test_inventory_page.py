@@ -34,7 +34,7 @@ def test_an_admin_sees_what_every_project_uses_and_sorts_them(page: Any, url: st
         return [" ".join(text.split()) for text in rows.nth(row).locator("td").all_text_contents()]
 
     assert [cells(row)[0] for row in (1, 2)] == ["default", "welding"]
-    assert cells(2)[1:5] == ["0.0 of 50000.0 MB", "60 min 0 s of 2 h 0 min", "0, 0 of 2000", "0 of 500"]
+    assert cells(2)[1:5] == ["0.0 MB of 50.0 GB", "60 min 0 s of 2 h 0 min", "0, 0", "0"]
     assert cells(2)[-1] == "30 days"
     assert (cells(1)[6:9], cells(1)[-1]) == (["1", "1", "0"], "for ever")
     crew = page.get_by_role("region", name="Workers").get_by_role("row").nth(1).text_content()
