@@ -91,7 +91,7 @@ class Counts(Generic[T]):
 
     Args:
         count: returns what it has counted, in a thread of its own.
-        turn: whoever counts holds it, so that all who share it need one connection to the database.
+        turn: the thread that counts holds it, so that all counts with the same turn need one connection to the database.
     """
 
     def __init__(self, count: Callable[[], T], turn: Lock) -> None:

@@ -1,4 +1,4 @@
-"""Who manages keys and projects does so in a database of this machine, or with ``--url`` over HTTP."""
+"""Keys and projects are managed in a database of this machine, or with ``--url`` over HTTP."""
 
 from __future__ import annotations
 

@@ -116,7 +116,7 @@ class WorkersAlike(BaseModel):
 class Inventory(Page):
     """Says what the service is made of, and holds one page of its projects with what they have."""
 
-    version: str = Field(description="Version of ciris that answers.")
+    version: str = Field(description="Version of the program that answers.")
     revision: str = Field(description="Revision of the database's tables.")
     workers: list[WorkersAlike] = Field(description="The workers that live.")
     messages: dict[str, int] = Field(description="Messages that wait, by queue; empty where the queue does not answer.")

@@ -10,7 +10,7 @@ from client.arguments.common import Parser, as_json, group, remote
 
 
 def _limit(text: str) -> float:
-    """Returns the number of a limit. Whoever holds projects to it knows how large it may be."""
+    """Returns the number of a limit. The database or the service knows how large it may be."""
     try:
         number = float(text)
     except ValueError:

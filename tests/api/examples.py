@@ -268,6 +268,7 @@ def record(client: TestClient, database: Database) -> dict[str, Any]:
     ask("GET", "/v1/scenes/{scene_id}/lint", scene_id=arm["id"])
     with database.write() as session:
         service.key = keys.add(session, "admin", Scope.ADMIN)  # type: ignore[attr-defined]
+        workers.tell(session, made, WorkerState.RUNNING)  # the inventory leaves out who has said nothing for a minute
         assert webhooks.of_job(session, grown["id"])
     time.sleep(1.5)
     ask("POST", "/v1/keys", {"name": "planner", "scope": "read", "days": 90})
