@@ -19,6 +19,7 @@ from db.session import Database
 from db.states import WorkerState
 from db.workers import Made, WorkerKind
 from tests.api.test_jobs import GROW
+from tests.workers.service import eventually
 
 Headers = dict[str, str]
 
@@ -184,8 +185,13 @@ def test_the_inventory_says_what_projects_have_and_who_works(
     with database.write() as session:
         jobs.claimed(jobs.get(session, job))
     keyed = client.get("/v1/projects/default", headers=made["boss"]).json()
-    found = client.get("/v1/inventory", headers=made["boss"]).json()
-    assert found["counted_at"] is not None
+    found: dict[str, Any] = {}
+
+    def counted() -> bool:
+        found.update(client.get("/v1/inventory", headers=made["boss"]).json())
+        return found["counted_at"] is not None
+
+    eventually(counted, "a busy machine has counted", 60)
     default, others = found["projects"]
     assert {name: default["has"][name] for name in ("scenes", "regions", "maps", "keys")} == {
         "scenes": 1,
