@@ -54,6 +54,11 @@ class Caller:
     key_id: str | None = None
     name: str = "anybody"
 
+    @property
+    def runs_service(self) -> bool:
+        """Whether this is an admin of the project ``default``. They see to what all projects share, and to the projects."""
+        return self.project == DEFAULT_PROJECT and self.scope.includes(Scope.ADMIN)
+
     def __str__(self) -> str:
         return self.name if self.key_id is None else f"{self.name} ({self.key_id})"
 
@@ -253,6 +258,28 @@ READ, SUBMIT, ADMIN = (Security(_Needs(scope), scopes=[scope.value]) for scope i
 Reader = Annotated[Caller, READ]
 Submitter = Annotated[Caller, SUBMIT]
 Admin = Annotated[Caller, ADMIN]
+
+
+async def _operator(caller: Admin) -> Caller:
+    check_runs_service(caller)
+    return caller
+
+
+def check_runs_service(caller: Caller) -> None:
+    """Refuses what is about other projects to everybody but those who run the service, before anything is looked up.
+
+    Raises:
+        CirisError: other_projects.
+    """
+    if not caller.runs_service:
+        problem = f"the key {caller.name!r} belongs to the project {caller.project}, and this is about other projects or all of them"
+        raise CirisError(
+            "other_projects", problem, field="Authorization", hint="ask those who run the service: admins of the project default"
+        )
+
+
+Operator = Annotated[Caller, Depends(_operator)]
+"""An admin of the project ``default``."""
 
 
 async def _whole(request: Request) -> Database:

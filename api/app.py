@@ -34,11 +34,13 @@ from api.routers import (
     cells,
     drawing,
     events,
+    inventory,
     jobs,
     motions,
     planning,
     plans,
     project,
+    projects,
     regions,
     results,
     scenes,
@@ -112,7 +114,10 @@ def create_app(db: Database | None = None) -> FastAPI:
     )
     app.add_middleware(AccessLog, requests=app.state.requests)
     problems.install(app, render_problem)
-    for module in (scenes, jobs, results, webhooks, events, regions, cells, planning, plans, drawing, motions, project, workers, service):
+    for module in (
+        *(scenes, jobs, results, webhooks, events, regions, cells, planning, plans, drawing, motions),
+        *(project, projects, inventory, workers, service),
+    ):
         app.include_router(module.router, dependencies=[KNOWN])
     app.include_router(events.project, dependencies=[KNOWN])
     app.include_router(login.router)

@@ -11,27 +11,29 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
-from threading import Thread
-from typing import Generic, TypeVar
+from threading import Lock, Thread
+from typing import Annotated, Generic, TypeVar
 
+from fastapi import Depends, Request
 from kombu.exceptions import OperationalError
 from redis.exceptions import RedisError
 from sqlalchemy.exc import SQLAlchemyError
 
 from certifier.errors import CirisError
-from db import version
+from db import inventory, statistics, version
+from db.inventory import Contents
 from db.session import Database
-from db.statistics import Statistics, collect
+from db.statistics import Statistics
 from workers.app import CONTROL, SOLVE, waiting
 
 WAIT_SECONDS = 0.5
 """Nobody waits longer than this for an answer."""
 QUICK_SECONDS, COST, BELIEVED_SECONDS, STATISTICS_SECONDS = 0.1, 10.0, 1.0, 60.0
 """An answer that took longer than QUICK_SECONDS is believed for COST times as long as that, but at most for BELIEVED_SECONDS, or
-STATISTICS_SECONDS for statistics. So nobody slows the others by asking again and again.
+STATISTICS_SECONDS for what is counted in all of the database. So nobody slows the others by asking again and again.
 """
 KEPT_SECONDS = 300.0
-"""Statistics that are older than this are not shown any more."""
+"""What was counted longer ago than this is not shown any more."""
 OK = "ok"
 SILENT = f"it does not answer within {WAIT_SECONDS:g} s"
 
@@ -84,6 +86,37 @@ def _in_thread(ask: Callable[[], T]) -> Future[T]:
     return asked
 
 
+class Counts(Generic[T]):
+    """Counts something in all of the database, which may take long where it is large.
+
+    Args:
+        count: returns what it has counted, in a thread of its own.
+        turn: the thread that counts holds it, so that all counts with the same turn need one connection to the database.
+    """
+
+    def __init__(self, count: Callable[[], T], turn: Lock) -> None:
+        def begun() -> tuple[float, T]:
+            with turn:
+                return time.monotonic(), count()
+
+        self._probe = Probe(begun, STATISTICS_SECONDS)
+        self._last: tuple[float, T] | None = None
+
+    async def answer(self) -> tuple[float, T] | None:
+        """Returns how many seconds ago it was counted, and what.
+
+        It is counted anew, but that may need longer than anybody waits. Then this is the last count, or None where there is none of the
+        last ``KEPT_SECONDS``.
+        """
+        with suppress(SQLAlchemyError, TimeoutError):
+            self._last = await self._probe.answer()
+        if self._last is None:
+            return None
+        began, counted = self._last
+        age = time.monotonic() - began
+        return None if age > KEPT_SECONDS else (age, counted)
+
+
 class Probes:
     """Holds what an API process asks about what it needs.
 
@@ -94,8 +127,8 @@ class Probes:
     def __init__(self, db: Database) -> None:
         self._database, self._queue = Probe(lambda: _database(db)), Probe(_messages)
         self._disk = Probe(lambda: db.disk.trouble() or OK) if db.sqlite else None
-        self._statistics = Probe(lambda: _collected(db), STATISTICS_SECONDS)
-        self._last: tuple[float, Statistics] | None = None
+        turn = Lock()
+        self._statistics, self._contents = Counts(lambda: _statistics(db), turn), Counts(lambda: inventory.collect(db), turn)
 
     async def checks(self) -> dict[str, str]:
         """Returns what each check says: ``OK``, or what is wrong."""
@@ -121,16 +154,20 @@ class Probes:
         return OK
 
     async def statistics(self) -> tuple[float, Statistics] | None:
-        """Returns the statistics and how many seconds old they are.
+        """Returns the statistics and how many seconds old they are; None where they are not counted yet."""
+        return await self._statistics.answer()
 
-        They are counted anew, but a large database may need longer for that than anybody waits. Then these are the last ones, or None
-        where there are none of the last ``KEPT_SECONDS``.
-        """
-        with suppress(SQLAlchemyError, TimeoutError):
-            self._last = await self._statistics.answer()
-        began, statistics = self._last or (-math.inf, None)
-        age = time.monotonic() - began
-        return None if statistics is None or age > KEPT_SECONDS else (age, statistics)
+    async def contents(self) -> tuple[float, dict[str, Contents]] | None:
+        """Returns what every project has, and how many seconds ago it was counted; None where it is not counted yet."""
+        return await self._contents.answer()
+
+
+async def _kept(request: Request) -> Probes:
+    probes: Probes = request.app.state.probes
+    return probes
+
+
+Asked = Annotated[Probes, Depends(_kept)]
 
 
 async def _said(check: Probe[str]) -> str:
@@ -155,8 +192,6 @@ def _messages() -> dict[str, int]:
     return {queue: waiting(queue) for queue in (CONTROL, SOLVE)}
 
 
-def _collected(db: Database) -> tuple[float, Statistics]:
-    """Returns when the statistics were counted, by the monotonic clock, and the statistics."""
-    began = time.monotonic()
+def _statistics(db: Database) -> Statistics:
     with db.read() as session:
-        return began, collect(session)
+        return statistics.collect(session)

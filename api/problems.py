@@ -48,7 +48,7 @@ _STATUS_OF_CODE = {
         ("first_key", "has_dependents", "not_ended", "webhook_waits", "worker_draining", "scene_unchanged", "scene_without_regions"),
         HTTPStatus.CONFLICT,
     ),
-    **dict.fromkeys(("storage_quota", "time_quota", "too_many_keys", "workers_shared"), HTTPStatus.FORBIDDEN),
+    **dict.fromkeys(("storage_quota", "time_quota", "too_many_keys", "workers_shared", "other_projects"), HTTPStatus.FORBIDDEN),
     "ambiguous_id": HTTPStatus.CONFLICT,
     "too_large": HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
     "content_encoding": HTTPStatus.UNSUPPORTED_MEDIA_TYPE,

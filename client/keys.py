@@ -2,33 +2,28 @@
 
 from __future__ import annotations
 
-import os
 from argparse import Namespace
 
 from certifier.errors import CirisError
-from ciris.synchronous.client import Client
 from client import output
-from client.commands import in_database
-from client.service import connect
+from client.managing import here, there
 
 OK = 0
-DATABASES = ("CIRIS_DATABASE_URL", "CIRIS_DATA_DIR")
-"""Variables that say which database is meant."""
 
 
 def add(args: Namespace) -> int:
     if args.url is None:
         days = [] if args.days is None else [f"--days={args.days}"]
-        return _here(args, ["add", args.name, f"--scope={args.scope}", *days, *_project(args)])
-    with _there(args) as client:
-        print(client.add_key(args.name, args.scope, args.days)["key"])
+        return here(args, "db.keys", ["add", args.name, f"--scope={args.scope}", *days, *_project(args)])
+    with there(args) as client:
+        print(client.add_key(args.name, args.scope, args.days, args.project)["key"])
     return OK
 
 
 def ls(args: Namespace) -> int:
     if args.url is None:
-        return _here(args, ["ls", *(["--json"] if args.json else [])])
-    with _there(args) as client:
+        return here(args, "db.keys", ["ls", *(["--json"] if args.json else [])])
+    with there(args) as client:
         keys = client.keys()
     if args.json:
         output.print_json(keys)
@@ -41,37 +36,14 @@ def ls(args: Namespace) -> int:
 
 def revoke(args: Namespace) -> int:
     if args.url is None:
-        return _here(args, ["revoke", args.name, *_project(args)])
-    with _there(args) as client:
+        return here(args, "db.keys", ["revoke", args.name, *_project(args)])
+    if args.project is not None:
+        hint = "leave one of them out; keys are revoked by admins of their own project"
+        raise CirisError("bad_option", "does not go with --url", field="--project", hint=hint)
+    with there(args) as client:
         client.revoke_key(args.name)
     return OK
 
 
 def _project(args: Namespace) -> list[str]:
     return [] if args.project is None else [f"--project={args.project}"]
-
-
-def _here(args: Namespace, words: list[str]) -> int:
-    """Acts on a database of this machine, or on that of CIRIS_DATABASE_URL.
-
-    Raises:
-        CirisError: option, where CIRIS_URL is all that says which keys are meant.
-    """
-    if os.environ.get("CIRIS_URL") and args.data is None and not any(map(os.environ.get, DATABASES)):
-        hint = "add --url URL for the keys of a service, or --data DIR for those of a database on this machine"
-        raise CirisError("option", "this command does not take its service from it", field="CIRIS_URL", hint=hint)
-    args.module, args.words = "db.keys", lambda _: words
-    return in_database(args)
-
-
-def _there(args: Namespace) -> Client:
-    """Returns a client of the service at ``--url``.
-
-    Raises:
-        CirisError: bad_option, with an option that is about the database.
-    """
-    for option in ("data", "project"):
-        if getattr(args, option, None) is not None:
-            hint = "leave one of them out; the keys of a service are those of the project of your own key"
-            raise CirisError("bad_option", "does not go with --url", field=f"--{option}", hint=hint)
-    return connect(args.url)

@@ -13,7 +13,7 @@ from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
 from db import pages
-from db.models import AuditRow
+from db.models import DEFAULT_PROJECT, AuditRow
 from db.pages import Page
 
 COMMAND_LINE = "command line"
@@ -44,6 +44,13 @@ class Action(StrEnum):
 def note(session: Session, project: str, who: str, action: Action, what: str) -> None:
     """Adds a line to a project's log."""
     session.add(AuditRow(id=str(uuid4()), project=project, who=who, action=action, what=what))
+
+
+def note_of_service(session: Session, project: str, who: str, action: Action, what: str) -> None:
+    """Adds a line about what those who run the service did to a project: to its log, and to their own, that of ``DEFAULT_PROJECT``."""
+    note(session, project, who, action, what)
+    if project != DEFAULT_PROJECT:
+        note(session, DEFAULT_PROJECT, who, action, what if what == project else f"{project}: {what}")
 
 
 def forgettable(session: Session, now: datetime) -> bool:

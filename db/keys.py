@@ -273,11 +273,11 @@ def _run(session: Session, given: argparse.Namespace) -> list[str]:
     match given.verb:
         case "add":
             key = add(session, given.name, given.scope, given.project, given.days)
-            audit.note(session, given.project, COMMAND_LINE, Action.KEY_MADE, made(given.name, given.scope, given.days))
+            audit.note_of_service(session, given.project, COMMAND_LINE, Action.KEY_MADE, made(given.name, given.scope, given.days))
             return [key]
         case "revoke":
             revoke(session, given.name, given.project)
-            audit.note(session, given.project, COMMAND_LINE, Action.KEY_REVOKED, given.name)
+            audit.note_of_service(session, given.project, COMMAND_LINE, Action.KEY_REVOKED, given.name)
             return []
         case _:
             return command_line.listed([_described(row) for row in newest(session)], as_json=given.json)

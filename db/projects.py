@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -58,6 +58,39 @@ def get(session: Session, name: str) -> ProjectRow:
 def all_of(session: Session) -> Sequence[ProjectRow]:
     """Returns every project, by name."""
     return session.scalars(select(ProjectRow).order_by(ProjectRow.name)).all()
+
+
+def page(session: Session, after: str | None, limit: int) -> tuple[Sequence[ProjectRow], str | None]:
+    """Returns a page of the projects, by name: those after the one of this name, and the name to go on after; None on the last page."""
+    query = select(ProjectRow).order_by(ProjectRow.name).limit(limit + 1)
+    rows = session.scalars(query if after is None else query.where(ProjectRow.name > after)).all()
+    return rows[:limit], rows[limit - 1].name if len(rows) > limit else None
+
+
+def limits(row: ProjectRow) -> dict[str, float | None]:
+    """Returns a project's limits, by name; None for no limit."""
+    return {"max_bytes": row.max_bytes, "keep_days": row.keep_days, "max_solver_seconds": row.max_solver_seconds}
+
+
+def set_limits(session: Session, name: str, given: Mapping[str, float | None], who: str = COMMAND_LINE) -> ProjectRow:
+    """Sets those limits of a project that are given, and notes who did so, with the values before and after.
+
+    Args:
+        given: limits as :func:`limits` names them; 0 or None takes one away.
+
+    Raises:
+        CirisError: project_not_found.
+    """
+    get(session, name)
+    # Others refer to the row meanwhile, but nobody else changes it.
+    row = session.get_one(ProjectRow, name, with_for_update={"key_share": True}, populate_existing=True)
+    before = limits(row)
+    for limit, value in given.items():
+        setattr(row, limit, value or None)
+    changed = [f"{limit} {_said(before[limit])} -> {_said(value)}" for limit, value in limits(row).items() if value != before[limit]]
+    if changed:
+        audit.note_of_service(session, name, who, Action.LIMITS_SET, ", ".join(changed))
+    return row
 
 
 def some_expires(session: Session) -> bool:
@@ -117,31 +150,24 @@ def _run(session: Session, given: argparse.Namespace) -> list[str]:
     match given.verb:
         case "add":
             add(session, given.name)
-            audit.note(session, given.name, COMMAND_LINE, Action.PROJECT_MADE, given.name)
+            audit.note_of_service(session, given.name, COMMAND_LINE, Action.PROJECT_MADE, given.name)
             return []
         case "set":
-            row = get(session, given.name)
-            if given.max_bytes is not None:
-                row.max_bytes = given.max_bytes or None
-            if given.keep_days is not None:
-                row.keep_days = given.keep_days or None
-            if given.max_solver_seconds is not None:
-                row.max_solver_seconds = given.max_solver_seconds or None
-            limits = ", ".join(f"{name} {value}" for name, value in _limits(row).items())
-            audit.note(session, row.name, COMMAND_LINE, Action.LIMITS_SET, limits)
+            typed = {"max_bytes": given.max_bytes, "keep_days": given.keep_days, "max_solver_seconds": given.max_solver_seconds}
+            row = set_limits(session, given.name, {limit: value for limit, value in typed.items() if value is not None})
             return command_line.listed([_described(session, row)], as_json=False)
         case _:
             return command_line.listed([_described(session, row) for row in all_of(session)], as_json=given.json)
 
 
-def _limits(row: ProjectRow) -> dict[str, float | None]:
-    return {"max_bytes": row.max_bytes, "keep_days": row.keep_days, "max_solver_seconds": row.max_solver_seconds}
+def _said(limit: float | None) -> str:
+    return "none" if limit is None else f"{limit:.15g}" if isinstance(limit, float) else str(limit)
 
 
 def _described(session: Session, row: ProjectRow) -> dict[str, Any]:
     return {
         "name": row.name,
-        **_limits(row),
+        **limits(row),
         "solver_seconds": round(solver_time.used(session, row.name), 1),
         "created_at": row.created_at.isoformat(timespec="seconds"),
     }

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from datetime import datetime, timedelta
 
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
@@ -27,6 +28,12 @@ def used(session: Session, project: str) -> float:
     """Returns the seconds in which solvers have worked for the project in the present month."""
     row = session.get(SolverTimeRow, (project, _month(utcnow())))
     return 0.0 if row is None else row.seconds
+
+
+def used_by_all(session: Session) -> dict[str, float]:
+    """Returns the same of every project for which solvers have worked in the present month, by name."""
+    query = select(SolverTimeRow.project, SolverTimeRow.seconds).where(SolverTimeRow.month == _month(utcnow()))
+    return dict(session.execute(query).all())
 
 
 def month_ends() -> datetime:

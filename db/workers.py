@@ -57,6 +57,17 @@ class Made:
     memory_bytes: int
 
 
+@dataclass(frozen=True)
+class Alike:
+    """Counts the workers of one kind, version and state, and the pieces of work that they do at the same time."""
+
+    kind: WorkerKind
+    version: str
+    state: WorkerState
+    workers: int
+    processes: int
+
+
 def tell(session: Session, made: Made, state: WorkerState, trouble: str | None = None) -> WorkerState:
     """Says that a worker lives, what it does and what fails, and returns what is wanted of it.
 
@@ -143,6 +154,15 @@ def counts(session: Session) -> dict[tuple[str, str], int]:
         select(WorkerRow.kind, WorkerRow.state, func.count()).where(_lives(session)).group_by(WorkerRow.kind, WorkerRow.state)
     )
     return {(kind.value, state.value): 0 for kind in WorkerKind for state in WorkerState} | {(kind, state): n for kind, state, n in found}
+
+
+def alike(session: Session) -> list[Alike]:
+    """Returns the workers that live, those of one kind, version and state together."""
+    what = (WorkerRow.kind, WorkerRow.version, WorkerRow.state)
+    found = session.execute(
+        select(*what, func.count(), func.sum(WorkerRow.processes)).where(_lives(session)).group_by(*what).order_by(*what)
+    )
+    return [Alike(WorkerKind(kind), version, WorkerState(state), workers, processes) for kind, version, state, workers, processes in found]
 
 
 def solvers(session: Session) -> int:

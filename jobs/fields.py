@@ -21,10 +21,13 @@ from jobs import patterns
 
 
 def integer(value: object) -> object:
-    """Refuses texts and truth for a whole number. Pydantic's own strictness would refuse 7.0 too, which is one in JSON."""
+    """Refuses texts and truth for a whole number. Pydantic's own strictness would refuse 7.0 too, which is one in JSON.
+
+    A large one such as 1e19 becomes an int here. Pydantic would say that it cannot parse it, and not how large it may be.
+    """
     if isinstance(value, bool | str):
         raise PydanticKnownError("int_type")
-    return value
+    return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def whole(least: float | None, greatest: float | None) -> Any:

@@ -13,8 +13,6 @@ from api.parameters import KNOWN_TO_PAGE
 from api.routers import workers
 from api.schemas.common import Cursor
 from api.schemas.workers import Worker
-from db.keys import Scope
-from db.models import DEFAULT_PROJECT
 from db.states import WorkerState
 
 router = APIRouter()
@@ -32,10 +30,16 @@ def workers_live(request: Request, caller: Reader, db: Db, after: Cursor = None)
 
 def _crew(caller: Reader, db: Db, after: str | None) -> dict[str, Any]:
     found = workers.list_workers(db, after)
-    may_ask = caller.scope.includes(Scope.ADMIN) and caller.project == DEFAULT_PROJECT
     last = _last(one for one in found.workers if one.wanted == WorkerState.RUNNING)
     context = {"last": last, "last_of_all": last | _last(one for one in found.workers if one.wanted != WorkerState.DRAINING)}
-    return {"workers": found.workers, "missing": found.missing, **context, "next": found.next, "after": after, "may_ask": may_ask}
+    return {
+        "workers": found.workers,
+        "missing": found.missing,
+        **context,
+        "next": found.next,
+        "after": after,
+        "may_ask": caller.runs_service,
+    }
 
 
 def _last(workers: Iterable[Worker]) -> set[str]:

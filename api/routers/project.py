@@ -6,11 +6,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path, status
 
-from api.access import ADMIN, READ, Admin, Db, Reader
+from api.access import ADMIN, READ, Admin, Db, Reader, WholeDb, check_runs_service
 from api.reading import ReadingRoute
 from api.room import KeptRoom
 from api.schemas.common import Cursor, Listed
-from api.schemas.service import AuditLine, AuditPage, KeyPage, KeySummary, MadeKey, NewKey, Project
+from api.schemas.projects import Project
+from api.schemas.service import AuditLine, AuditPage, KeyPage, KeySummary, MadeKey, NewKey
 from api.writing import writing
 from certifier.errors import CirisError
 from db import audit, keys, projects, solver_time
@@ -27,25 +28,20 @@ def get_project(caller: Reader, db: Db, room: KeptRoom) -> Project:
     """Returns the project that the caller's key belongs to: how much it stores, how long solvers worked for it, and its limits."""
     with db.read() as session:
         row, seconds = projects.get(session, caller.project), solver_time.used(session, caller.project)
-    return Project(
-        name=row.name,
-        scope=caller.scope,
-        bytes=room.stored(db, row.name),
-        max_bytes=row.max_bytes,
-        keep_days=row.keep_days,
-        solver_seconds=seconds,
-        max_solver_seconds=row.max_solver_seconds,
-        month_ends_at=solver_time.month_ends(),
-    )
+    return Project.of(row, seconds, scope=caller.scope, bytes=room.stored(db, row.name))
 
 
 @router.post("/keys", status_code=status.HTTP_201_CREATED)
 @writing
-def create_key(body: NewKey, caller: Admin, db: Db) -> MadeKey:
+def create_key(body: NewKey, caller: Admin, db: WholeDb) -> MadeKey:
     """Makes an API key of the caller's project. The answer is the only one that ever shows it.
 
-    The first key of a service is made at its command line, so that nobody can lock its owner out.
+    Admins of the project `default` may make keys of every project, such as the first one of a new project. The first key of a service
+    is made at its command line, so that nobody can lock its owner out.
     """
+    project = body.project or caller.project
+    if project != caller.project:
+        check_runs_service(caller)
     with db.write() as session:
         if not keys.exist(session):
             raise CirisError(
@@ -54,8 +50,9 @@ def create_key(body: NewKey, caller: Admin, db: Db) -> MadeKey:
                 field="name",
                 hint="make it at the service's machine: `ciris key add`",
             )
-        key = keys.add(session, body.name, body.scope, caller.project, body.days)
-        audit.note(session, caller.project, str(caller), Action.KEY_MADE, keys.made(body.name, body.scope, body.days))
+        key = keys.add(session, body.name, body.scope, project, body.days)
+        note = audit.note if project == caller.project else audit.note_of_service
+        note(session, project, str(caller), Action.KEY_MADE, keys.made(body.name, body.scope, body.days))
     return MadeKey(name=body.name, scope=body.scope, key=key)
 
 

@@ -3,27 +3,18 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Annotated
 
-from fastapi import APIRouter, Depends, Request, Response, status
+from fastapi import APIRouter, Request, Response, status
 
 from api import metrics
 from api.access import READ, WholeDb
-from api.probes import OK, Probes
+from api.probes import OK, Asked
 from api.schemas.service import Health, Readiness
 
 OTHERS = frozenset({"queue"})
 """An API process can serve requests without what these checks are about."""
 
 router = APIRouter(tags=["service"])
-
-
-async def _probes(request: Request) -> Probes:
-    probes: Probes = request.app.state.probes
-    return probes
-
-
-Asked = Annotated[Probes, Depends(_probes)]
 
 
 @router.get("/healthz")

@@ -19,7 +19,7 @@ from api.writing import writing
 from certifier.errors import CirisError
 from db import activity, audit, clock, jobs, leases, workers
 from db.audit import Action
-from db.models import DEFAULT_PROJECT, PairRow, StepRow, WorkerRow
+from db.models import PairRow, StepRow, WorkerRow
 from db.session import Database
 from db.states import WorkerState
 from db.workers import WorkerKind
@@ -76,7 +76,7 @@ _NOTED = {
 
 
 def _ask(db: Database, caller: Caller, worker_id: str, state: WorkerState) -> Worker:
-    if caller.project != DEFAULT_PROJECT:
+    if not caller.runs_service:
         problem = f"workers serve all projects; the key {caller.name!r} belongs to the project {caller.project}"
         raise CirisError(
             "workers_shared", problem, field="Authorization", hint="ask those who run the service: admins of the project default"

@@ -15,6 +15,12 @@ Document = dict[str, Any]
 Cursor = Annotated[
     str | None, Query(max_length=200, description="The value of `next` from the page before; leave it out for the first page.")
 ]
+NameCursor = Annotated[
+    str | None,
+    Query(
+        max_length=64, description="List only what comes after this name: the value of `next` from the page before.", examples=["default"]
+    ),
+]
 Listed = Annotated[int, Query(ge=1, le=1000, description="Return at most this many.")]
 SceneGiven = Annotated[
     str, Path(description="A scene: its id, its first characters, a name of it, or `NAME@staged`.", examples=["planar-2dof"])

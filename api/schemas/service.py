@@ -30,11 +30,14 @@ class Readiness(BaseModel):
 
 
 class NewKey(Request):
-    """Asks for an API key of the caller's project."""
+    """Asks for an API key of the caller's project, or of another one, which admins of the project `default` may do."""
 
     name: str = Field(pattern=patterns.KEY_NAME, description="No other key of the project may have this name.", examples=["planner"])
     scope: Scope = Field(description="What the key allows; each scope includes those before it: read, submit, admin.")
     days: float | None = Field(None, gt=0, le=MOST_DAYS, description="The key expires after this many days; null for never.", examples=[90])
+    project: str | None = Field(
+        None, pattern=patterns.KEY_NAME, description="The project that the key belongs to; null for the caller's own.", examples=["welding"]
+    )
 
 
 class KeySummary(BaseModel):
@@ -106,18 +109,3 @@ class Dependents(BaseModel):
     maps: int = Field(description="Maps that are stored.")
     webhooks: int = Field(description="Webhooks that wait: receivers that were not told yet that a job has ended, and would never be.")
     bytes: int = Field(description="Bytes of proofs and cells.")
-
-
-class Project(BaseModel):
-    """Describes the caller's project."""
-
-    name: str = Field(description="The project's name.")
-    scope: Scope = Field(description="What the caller's key allows.")
-    bytes: int = Field(description="Bytes of scenes, jobs, proofs and cells that the project stores, as of some seconds ago.")
-    max_bytes: int | None = Field(description="The service refuses new scenes and jobs once this many bytes are stored; null for no limit.")
-    keep_days: float | None = Field(description="Days after a job's end when its data is deleted, except its regions; null for never.")
-    solver_seconds: float = Field(description="Seconds in which solvers have worked for the project since the calendar month (UTC) began.")
-    max_solver_seconds: float | None = Field(
-        description="The service refuses new jobs once solvers have worked for the project this many seconds in a month; null for no limit."
-    )
-    month_ends_at: datetime = Field(description="When the next month begins, and `solver_seconds` is 0 again.")

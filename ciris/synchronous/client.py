@@ -220,17 +220,41 @@ class Client:
     def _delete(self, path: str, dependents: bool) -> None:
         self._send("DELETE", f"/v1/{path}", params={"dependents": "delete" if dependents else "keep"})
 
-    def project(self) -> Document:
-        """Returns the project of the key: how much it stores, how long solvers worked for it this month, and its limits."""
-        return self._json("GET", "/v1/project")
+    def project(self, name: str | None = None) -> Document:
+        """Returns a project: how much it stores, how long solvers worked for it this month, and its limits.
+
+        Args:
+            name: any project, for admins of the project ``default``; None for that of the key.
+        """
+        return self._json("GET", "/v1/project" if name is None else f"/v1/projects/{segment(name)}")
+
+    def projects(self) -> list[Document]:
+        """Returns all projects with their limits, by name, to an admin of the project ``default``."""
+        return self._all("projects")
+
+    def add_project(self, name: str) -> Document:
+        """Makes a project, for an admin of the project ``default``. :meth:`add_key` makes its first key."""
+        return self._json("POST", "/v1/projects", json={"name": name})
+
+    def set_limits(
+        self, project: str, *, max_bytes: float | None = None, keep_days: float | None = None, max_solver_seconds: float | None = None
+    ) -> Document:
+        """Sets those limits of a project that are not None, for an admin of the project ``default``. 0 takes a limit away."""
+        limits = given(max_bytes=max_bytes, keep_days=keep_days, max_solver_seconds=max_solver_seconds)
+        return self._json("PATCH", f"/v1/projects/{segment(project)}", json=limits)
 
     def keys(self) -> list[Document]:
         """Returns the keys of the project, newest first, without what is secret."""
         return self._all("keys")
 
-    def add_key(self, name: str, scope: str, days: float | None = None) -> Document:
-        """Makes a key of the project, which expires after this many days, or never. The answer is the only one that shows it."""
-        return self._json("POST", "/v1/keys", json={"name": name, "scope": scope, "days": days})
+    def add_key(self, name: str, scope: str, days: float | None = None, project: str | None = None) -> Document:
+        """Makes a key of the project, which expires after this many days, or never. The answer is the only one that shows it.
+
+        Args:
+            project: any project, for admins of the project ``default``; None for that of the key.
+        """
+        asked = {"name": name, "scope": scope, "days": days, **given(project=project)}
+        return self._json("POST", "/v1/keys", json=asked)
 
     def revoke_key(self, name: str) -> None:
         """Revokes the project's key of this name."""

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import math
 from typing import Any
 
 from client.arguments.common import Parser, as_json, group, remote
 
 
-def _limits(args: argparse.Namespace) -> list[str]:
-    """Returns the words of ``ciris project set``."""
-    given = {"--max-bytes": args.max_bytes, "--keep-days": args.keep_days, "--max-solver-seconds": args.max_solver_seconds}
-    return ["set", args.name, *(f"{option}={value}" for option, value in given.items() if value is not None)]
+def _limit(text: str) -> float:
+    """Returns the number of a limit. The database or the service knows how large it may be."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = -1.0
+    if not 0 <= number < math.inf:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 0 on; 0 takes the limit away")
+    return number
 
 
 def add(verbs: Any) -> None:
@@ -24,28 +30,36 @@ def add(verbs: Any) -> None:
     database = Parser(add_help=False)
     database.add_argument("--data", metavar="DIR", help="data directory; default: CIRIS_DATA_DIR; not used where CIRIS_DATABASE_URL is set")
     project = group(
-        verbs.add_parser("project", help="make and list projects and set their limits, in this machine's database; show your own")
+        verbs.add_parser(
+            "project", help="make, list and limit projects: in this machine's database, or with --url over HTTP; show your own"
+        )
     )
-    new = project.add_parser("add", parents=[database], help="make a project; its keys see nothing of other projects")
+    by_operators = Parser(add_help=False)
+    by_operators.add_argument("--url", help="URL of a service; then it needs an admin's key of the project default")
+    new = project.add_parser("add", parents=[database, by_operators], help="make a project; its keys see nothing of other projects")
     new.add_argument("name", metavar="NAME", help="the new project's name")
-    new.set_defaults(run="client.commands:in_database", module="db.projects", words=lambda args: ["add", args.name])
-    known = project.add_parser("ls", parents=[database, as_json()], help="list the projects with their limits")
-    known.set_defaults(
-        run="client.commands:in_database", module="db.projects", words=lambda args: ["ls", *(["--json"] if args.json else [])]
-    )
-    limits = project.add_parser("set", parents=[database], help="set a project's limits; 0 for none")
+    new.set_defaults(run="client.project:add")
+    known = project.add_parser("ls", parents=[database, by_operators, as_json()], help="list the projects with their limits")
+    known.set_defaults(run="client.project:ls")
+    limits = project.add_parser("set", parents=[database, by_operators], help="set a project's limits; 0 for none")
     limits.add_argument("name", metavar="NAME", help="the project's name")
-    limits.add_argument("--max-bytes", metavar="N", help="refuse new scenes and jobs once the project stores N bytes; 0: no limit")
-    limits.add_argument("--keep-days", metavar="DAYS", help="delete a job's data, except its regions, DAYS days after its end; 0: never")
+    limits.add_argument(
+        "--max-bytes", type=_limit, metavar="N", help="refuse new scenes and jobs once the project stores N bytes; 0: no limit"
+    )
+    limits.add_argument(
+        "--keep-days", type=_limit, metavar="DAYS", help="delete a job's data, except its regions, DAYS days after its end; 0: never"
+    )
     limits.add_argument(
         "--max-solver-seconds",
+        type=_limit,
         metavar="S",
         help="refuse new jobs in a calendar month (UTC) in which solvers have worked S seconds for the project; 0: no limit",
     )
-    limits.set_defaults(run="client.commands:in_database", module="db.projects", words=_limits)
+    limits.set_defaults(run="client.project:set_limits")
     mine = project.add_parser(
-        "show", parents=[remote(), as_json()], help="show your own project on a service: its limits, and what remains of them"
+        "show", parents=[remote(), as_json()], help="show a project of a service: its limits, and what remains of them"
     )
+    mine.add_argument("name", metavar="NAME", nargs="?", help="any project, for admins of the project default; default: your own")
     mine.set_defaults(run="client.project:show")
 
     kept = group(verbs.add_parser("db", help="migrate, back up and restore this machine's database, or that of CIRIS_DATABASE_URL"))
@@ -70,23 +84,26 @@ def add(verbs: Any) -> None:
     key = group(verbs.add_parser("key", help="make, list and revoke API keys: in this machine's database, or with --url over HTTP"))
     over_http = Parser(add_help=False)
     over_http.add_argument("--url", help="URL of a service; then an admin's key of it manages the keys of its own project")
-    of_project = Parser(add_help=False)
-    of_project.add_argument(
-        "--project", metavar="NAME", help="the project that the key belongs to; default: the project named default; not with --url"
-    )
-    made = key.add_parser("add", parents=[database, over_http, of_project], help="make a key and print it; it is shown only once")
+    made = key.add_parser("add", parents=[database, over_http], help="make a key and print it; it is shown only once")
     made.add_argument("name", metavar="NAME", help="the new key's name")
     made.add_argument(
         "--scope", choices=["read", "submit", "admin"], required=True, help="what the key allows; each scope includes those before it"
+    )
+    made.add_argument(
+        "--project",
+        metavar="NAME",
+        help="the project that the key belongs to; with --url this needs an admin's key of the project default; default: "
+        "the project named default, or with --url your own",
     )
     made.add_argument("--days", type=float, metavar="N", help="the key expires after N days; default: never")
     made.set_defaults(run="client.keys:add")
     listed = key.add_parser("ls", parents=[database, over_http, as_json()], help="list the keys, when each was last used, and no secrets")
     listed.set_defaults(run="client.keys:ls")
-    revoked = key.add_parser(
-        "revoke", parents=[database, over_http, of_project], help="revoke a key; the service refuses it within a second"
-    )
+    revoked = key.add_parser("revoke", parents=[database, over_http], help="revoke a key; the service refuses it within a second")
     revoked.add_argument("name", metavar="NAME", help="the key's name")
+    revoked.add_argument(
+        "--project", metavar="NAME", help="the project that the key belongs to; default: the project named default; not with --url"
+    )
     revoked.set_defaults(run="client.keys:revoke")
 
     bench = verbs.add_parser("bench", help="measure ciris, and Drake beside it if asked; see ciris bench BENCHMARK --help")

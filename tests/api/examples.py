@@ -53,6 +53,7 @@ SELDOM: dict[str, dict[str, Any]] = {
     "Job": JOB,
     "AcceptedJob": JOB,
     "HeldWork": {"job": "1f9b2a7c-5b0e-4b58-9c39-2f1d6a3c8e10"},
+    "Inventory": {"next": "welding"},
     "JobMotion": CERTAIN,
     "KeyPage": {"next": "MjAyNi0wNS0wMVQwODowMDowMCswMDowMCA1ZDBj"},
     "KeySummary": {"last_used_at": "2026-04-30T16:00:00Z", "expires_at": "2026-05-29T08:00:00Z", "revoked_at": "2026-05-01T08:00:00Z"},
@@ -61,6 +62,7 @@ SELDOM: dict[str, dict[str, Any]] = {
     "PairCell": {"witness_q": [0.4, 0.3], "open_cells": 12},
     "PairMatrix": {"next": "3.41"},
     "Partition": {"iteration": 7},
+    "ProjectPage": {"next": "welding"},
     "Piece": {"map": "0d6f0f5e-52c7-4a3f-8d5c-0b7f7a9f3c21"},
     "PlanResponse": {
         "guarantee": "exact",
@@ -266,11 +268,17 @@ def record(client: TestClient, database: Database) -> dict[str, Any]:
     ask("GET", "/v1/scenes/{scene_id}/lint", scene_id=arm["id"])
     with database.write() as session:
         service.key = keys.add(session, "admin", Scope.ADMIN)  # type: ignore[attr-defined]
+        workers.tell(session, made, WorkerState.RUNNING)  # the inventory leaves out who has said nothing for a minute
         assert webhooks.of_job(session, grown["id"])
     time.sleep(1.5)
     ask("POST", "/v1/keys", {"name": "planner", "scope": "read", "days": 90})
     ask("DELETE", "/v1/keys/{name}", name="nobody")
-    for route in ("/v1/keys", "/v1/audit", "/v1/project"):
+    ask("POST", "/v1/projects", {"name": "welding"})
+    ask("POST", "/v1/keys", {"name": "alice", "scope": "admin", "project": "welding"})
+    limits = {"max_bytes": 50_000_000_000, "keep_days": 30, "max_solver_seconds": 720_000}
+    ask("PATCH", "/v1/projects/{project}", limits, project="welding")
+    ask("GET", "/v1/projects/{project}", project="welding")
+    for route in ("/v1/keys", "/v1/audit", "/v1/project", "/v1/projects", "/v1/inventory"):
         ask("GET", route)
     ask("POST", "/v1/jobs", {"kind": "grow", "scene": name, "seed": {"q": [9.0, 0.0]}})
     for route, bodies in offered(name, home, away, grown["region"]).items():

@@ -57,6 +57,46 @@ def test_an_admin_manages_the_keys_of_the_project_over_http(ciris: Ciris, url: s
     assert ciris("job", "ls", CIRIS_URL=url, CIRIS_API_KEY=key).status == 2
 
 
+def test_whoever_runs_the_service_makes_a_team_over_http(ciris: Ciris, url: str, database: Database) -> None:
+    with database.write() as session:
+        admin = keys.add(session, "boss", Scope.ADMIN)
+    time.sleep(KEYS_SECONDS)
+    assert ciris("project", "add", "welding", "--url", url, CIRIS_API_KEY=admin).status == 0
+    made = ciris("key", "add", "alice", "--scope", "admin", "--project", "welding", "--url", url)
+    limited = ciris("project", "set", "welding", "--max-bytes", "50e9", "--keep-days", "30", "--url", url)
+    assert (limited.status, limited.stdout) == (0, "max_bytes 50000000000  keep_days 30\n")
+    listed = ciris("project", "ls", "--json", "--url", url).json
+    assert [(one["name"], one["max_bytes"], one["keep_days"]) for one in listed] == [
+        ("default", None, None),
+        ("welding", 50_000_000_000, 30),
+    ]
+    assert ciris("project", "ls", "--url", url).stdout.splitlines()[2].split()[:3] == ["welding", "50000000000", "30"]
+    assert ciris("project", "set", "welding", "--keep-days", "0", "--url", url).stdout == "max_bytes 50000000000\n"
+    shown = ciris("project", "show", "welding", "--url", url).stdout
+    assert ("project welding\n" in shown, "of 50000.0 MB" in shown, "your scope" in shown) == (True, True, False)
+    for words, said in (
+        (("add", "welding"), "there is a project 'welding' already"),
+        (("add", "a b"), "a name has up to 64 letters"),
+        (("add", ""), "a name has up to 64 letters"),
+        (("set", "nobody", "--keep-days", "1"), "there is no project 'nobody'"),
+        (("show", "nobody"), "there is no project 'nobody'"),
+        (("set", "welding", "--max-bytes", "1e19"), "--max-bytes: input should be less than or equal to"),
+        (("set", "welding", "--max-bytes", "inf"), "--max-bytes: inf is not a number from 0 on; 0 takes the limit away"),
+        (("add", "mine", "--data", "here"), "--data: does not go with --url"),
+    ):
+        refused = ciris("project", *words, "--url", url)
+        assert refused.status == 2
+        assert said in refused.error
+    alice = made.stdout.strip()
+    assert ciris("project", "show", "--json", "--url", url, CIRIS_API_KEY=alice).json["name"] == "welding"
+    for words in (("ls",), ("add", "more"), ("set", "welding", "--keep-days", "0"), ("show", "welding"), ("show", "nobody")):
+        refused = ciris("project", *words, "--url", url)
+        assert refused.status == 2
+        assert "ask those who run the service: admins of the project default" in refused.error
+    assert ciris("key", "add", "spy", "--scope", "read", "--project", "default", "--url", url).status == 2
+    assert "--project: does not go with --url" in ciris("key", "revoke", "boss", "--project", "default", "--url", url).error
+
+
 def test_the_command_shows_what_a_project_has_used_and_what_is_left(ciris: Ciris, url: str, database: Database) -> None:
     with database.write() as session:
         solver_time.add(session, "default", 60.0)
@@ -90,7 +130,10 @@ def test_projects_on_the_command_line(tmp_path: Path, monkeypatch: pytest.Monkey
     assert "max_bytes" not in capsys.readouterr().out
     with closing(Database(Settings().database)) as database, database.of("welding").read() as session:
         said = [row.what for row in audit.page(session).rows if row.action == "limits_set"]
-    assert "max_bytes 1000000000, keep_days 30.0, max_solver_seconds 720000.0" in said
+    assert said == ["max_bytes 1000000000 -> none", "max_bytes none -> 1000000000, keep_days none -> 30, max_solver_seconds none -> 720000"]
+    with closing(Database(Settings().database)) as database, database.of("default").read() as session:
+        said = [row.what for row in audit.page(session).rows]
+    assert said[:2] == ["welding: max_bytes 1000000000 -> none", "welding: planner (read)"], "those who run the service find it, too"
     for wrong in (["set", "welding", "--keep-days", "-1"], ["set", "nobody"], ["add", "welding"]):
         with pytest.raises(SystemExit) as ended:
             projects.main(wrong)
@@ -145,6 +188,16 @@ def test_keys_are_those_of_a_database_that_is_named(tmp_path: Path) -> None:
     migrate.upgrade(f"sqlite:///{data / 'ciris.sqlite3'}")
     for words in (("ls",), ("revoke", "planner"), ("add", "planner", "--scope", "read")):
         done = key(*words, CIRIS_URL="https://ciris.example.org")
+        assert (done.returncode, done.stdout) == (2, "")
+        assert done.stderr.startswith("error: CIRIS_URL: this command does not take its service from it (add --url URL")
+    for words in (("ls",), ("add", "welding"), ("set", "welding", "--keep-days", "1")):
+        done = subprocess.run(
+            command("project", *words),
+            env=surroundings(XDG_DATA_HOME=str(tmp_path), CIRIS_URL="https://ciris.example.org"),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         assert (done.returncode, done.stdout) == (2, "")
         assert done.stderr.startswith("error: CIRIS_URL: this command does not take its service from it (add --url URL")
     listed = key("ls")

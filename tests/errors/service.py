@@ -152,13 +152,12 @@ def a_draining_one(t: Trial) -> str:
         return workers.page(session).rows[0].id
 
 
-def with_a_key_of_others(t: Trial) -> None:
-    worker = a_draining_one(t)
+def with_a_key_of_others(t: Trial, method: str, path: str) -> None:
     with t.need("database").write() as session:
         projects.add(session, "others")
         key = keys.add(session, "boss", Scope.ADMIN, "others")
     time.sleep(KEYS_SECONDS)
-    t.ask("POST", f"/v1/workers/{worker}/pause", headers={"Authorization": f"Bearer {key}"})
+    t.ask(method, path, headers={"Authorization": f"Bearer {key}"})
 
 
 SERVICE: Table = {
@@ -168,7 +167,8 @@ SERVICE: Table = {
     ("region_elsewhere", "regions[0]"): [lambda t: sliced(t, regions=["none"])],
     ("worker_not_found", "worker"): [lambda t: t.ask("GET", "/v1/workers/nobody")],
     ("worker_draining", "worker"): [lambda t: t.ask("POST", f"/v1/workers/{a_draining_one(t)}/resume")],
-    ("workers_shared", "Authorization"): [with_a_key_of_others],
+    ("workers_shared", "Authorization"): [lambda t: with_a_key_of_others(t, "POST", f"/v1/workers/{a_draining_one(t)}/pause")],
+    ("other_projects", "Authorization"): [lambda t: with_a_key_of_others(t, "GET", "/v1/projects")],
     ("ambiguous_id", "job"): [twins],
     ("idempotency_conflict", "Idempotency-Key"): [lambda t: post(t, CERTIFY, times=2, **{"Idempotency-Key": "k"})],
     ("quota_exceeded", ""): [too_many],

@@ -141,4 +141,5 @@ TEAMS: Table = {
         lambda t: with_settings(t, CIRIS_DATABASE_URL=f"sqlite:///{t.directory}/one.sqlite3"),
         lambda t: t.ciris("key", "ls", "--url", "http://127.0.0.1:9", "--data", "here"),
     ],
+    ("bad_option", "--project"): [lambda t: t.ciris("key", "revoke", "planner", "--url", "http://127.0.0.1:9", "--project", "default")],
 }
