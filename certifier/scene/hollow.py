@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from certifier.model import Array, Geometry, Scene
 from certifier.scene.decomposition.solid import wound
@@ -121,9 +121,14 @@ def _beyond(hull: Array, triangles: Array, slack: float) -> float:
     """Returns the estimate for triangles (h, 3, 3) of a hull and (t, 3, 3) of what is in it; 0 where it is not notable."""
     if not len(triangles):
         return 0.0
-    distances = _Distances(triangles)
-    found = ((point, distances.of(point[0] @ point[1])) for point in reversed(_spread(hull, _POINTS)) if distances.looks > 0)
-    farthest, reached = max(found, key=lambda pair: pair[1])
+    distances, spread = _Distances(triangles), _spread(hull, _POINTS)[::-1]
+    most = distances.at_most(np.array([weights @ triangle for weights, triangle in spread]))
+    farthest, reached = spread[int(most.argmax())], 0.0
+    for k in np.argsort(-most, kind="stable").tolist():
+        if most[k] <= reached or distances.looks <= 0:
+            break
+        if (distance := distances.of(spread[k][0] @ spread[k][1])) > reached:
+            farthest, reached = spread[k], distance
     reached = _climbed(*farthest, reached, distances) - slack
     return reached if reached > _NOTABLE * float(np.ptp(hull.reshape(-1, 3), axis=0).max()) else 0.0
 
@@ -167,6 +172,11 @@ class _Distances:
         self._triangles, self._middles = triangles, triangles.mean(axis=1)
         self._reach = np.linalg.norm(triangles - self._middles[:, None], axis=2).max(axis=1)
         self.looks = _LOOKS + _LOOKS_A_TRIANGLE * len(triangles)
+
+    def at_most(self, points: Array) -> Array:
+        """Returns the distances of points (k, 3) from the nearest middle of a triangle, (k,)."""
+        found: Array = cKDTree(self._middles).query(points)[0]
+        return found
 
     def of(self, point: Array) -> float:
         """Returns the distance of a point (3,).

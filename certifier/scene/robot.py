@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import shutil
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from certifier.errors import SceneError
 from certifier.names import escaped
 from certifier.scene.draft import beside_model
+from certifier.scene.macros import in_xacro
 from certifier.scene.packages import packages_of, places_of, taken_from
 from certifier.scene.references import is_mjcf, mjcf_references, references, resolve
 
@@ -37,7 +38,7 @@ def only_scene(root: Path) -> str:
     found = [file for file in written if file.name == SCENE_FILE] or [file for file in written if _DIRECTIVES.search(file.read_bytes())]
     found = found or _models(root) or (written if len(written) == 1 else [])
     if not found and any(root.rglob("*.xacro")):
-        hint = "expand the xacro to a .urdf, or use `ciris scene init` and `ciris scene add`, which expand it"
+        hint = "expand the xacro, as `xacro FILE > robot.urdf` does, or use `ciris scene init` and `ciris scene add`, which expand it"
         raise SceneError("bundle_zip", "the zip has no scene file, and no model of a robot but in xacro", field="bundle", hint=hint)
     if not found:
         hint = f"add a {SCENE_FILE}, or a robot's model: {', '.join(MODELS)}"
@@ -66,8 +67,11 @@ def packages_in(model: Path, root: Path) -> dict[str, Path]:
     from it. Where that begins below the package's own directory, the files are copied into such directories.
 
     Raises:
-        SceneError: ``scene_package``.
+        SceneError: ``scene_package``; ``bundle_file`` for a model that is written in xacro, which is not expanded here.
     """
+    if in_xacro(model, model.name):
+        hint = f"expand it, as `xacro {model.name} > robot.urdf` does, or use `ciris scene init` and `ciris scene add`, which expand it"
+        raise SceneError("bundle_file", f"{model.name} is written in xacro, which the service does not run", hint=hint)
     given = {}
     for name, files in taken_from(model).items():
         if not any(place.is_dir() for place in places_of(name, model, {})):
@@ -95,7 +99,7 @@ def _copied(head: list[str], place: Path, files: list[str], root: Path) -> Path:
 
     The process that unpacks may make no links.
     """
-    package = Path(tempfile.mkdtemp(prefix="package-", dir=root))
+    package = next(path for k in itertools.count() if not (path := root / f"package-{k}").exists())
     inside = package.joinpath(*head)
     waiting = [place.joinpath(*file.split("/")[len(head) :]) for file in files]
     copied = set[Path]()
