@@ -107,7 +107,7 @@ def unpack(bundle: Path, root: Path, limits: BundleLimits) -> str:
     """Writes the zip's files below root, and returns the path of the scene file.
 
     Raises:
-        SceneError: ``bundle_too_large``, ``bundle_zip``, ``bundle_path``.
+        SceneError: ``bundle_too_large``, ``bundle_zip``, ``bundle_choice``, ``bundle_path``.
     """
     try:
         with zipfile.ZipFile(bundle) as archive:

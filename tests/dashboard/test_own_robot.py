@@ -52,7 +52,11 @@ def test_the_zip_of_a_package_is_taken_whatever_part_of_it_it_is(
     page: Any, url: str, client: TestClient, tmp_path: Path, mesh: str, model: str, link: str
 ) -> None:
     """A package has settings in YAML, other models with references to nowhere, and xacro. None of it is about the robot."""
-    beside = {"config__joint_limits___yaml": LIMITS, "config__controllers___yaml": "a: &a 1\nb: *a\n", "worlds__sun___xml": '<uri file="/x"/>'}
+    beside = {
+        "config__joint_limits___yaml": LIMITS,
+        "config__controllers___yaml": "a: &a 1\nb: *a\n",
+        "worlds__sun___xml": '<uri file="/x"/>',
+    }
     upload(page, url, packed(tmp_path, **{model: urdf("arm", mesh), link: TETRAHEDRON, **beside}))
     page.get_by_text("arm is stored, with 2 joints and 1 pair").wait_for()
     page.locator(".slider").nth(1).wait_for()
