@@ -21,18 +21,21 @@ export function named({ id, name, names }: Scene): string {
   return names.includes(name) ? name : (names[0] ?? id);
 }
 
-/** A zip with several files of which each may be the scene or the robot. */
+/** A zip with several files of which each may be the scene or the robot, by what they may be. */
 interface Several {
   file: File;
-  paths: string[];
+  groups: [string, string[]][];
 }
 
-const MODELS = [/\.(urdf|sdf|mjcf)$/i, /\.ya?ml$/i, /(?<!package)\.xml$/i];
+const GROUPS: [string, RegExp][] = [
+  ["Models of robots", /\.(urdf|sdf|mjcf)$/i],
+  ["Scene files", /\.yaml$/i],
+  ["Models of MuJoCo", /\.xml$/i],
+];
 
-/** What may be the scene in a zip: files of the first kind that it has several of. */
 async function several(file: File): Promise<Several> {
-  const paths = (await pathsIn(file)).filter((path) => !path.startsWith("__MACOSX"));
-  return { file, paths: MODELS.map((kind) => paths.filter((path) => kind.test(path))).find((some) => some.length > 1) ?? [] };
+  const paths = (await pathsIn(file)).filter((path) => !/^__MACOSX|(^|\/)package\.xml$/.test(path));
+  return { file, groups: GROUPS.map(([title, kind]): [string, string[]] => [title, paths.filter((path) => kind.test(path)).sort()]).filter(([, found]) => found.length > 0) };
 }
 
 /** Where in a scene file something is wrong. */
@@ -61,7 +64,7 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
       onUpload(scene);
     } catch (reason) {
       const found = whole && reason instanceof ServiceError && reason.code === "bundle_choice" ? await several(whole) : null;
-      if (found?.paths.length) setChoice(found);
+      if (found?.groups.length) setChoice(found);
       else setProblem(`${name} is no scene that can be used: ${where(reason)}${said(reason)}`);
     }
     setSending(null);
@@ -117,7 +120,7 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
             <label for="new-which">{choice.file.name} has several robots or scenes. Which one?</label>{" "}
             <select id="new-which" value="" onChange={({ currentTarget: { value } }) => void send(value, () => saying(choice.file, value))}>
               <option value="">choose …</option>
-              {choice.paths.map((path) => <option key={path}>{path}</option>)}
+              {choice.groups.map(([title, paths]) => <optgroup label={title} key={title}>{paths.map((path) => <option key={path}>{path}</option>)}</optgroup>)}
             </select>
           </p>
         )}
