@@ -72,7 +72,7 @@ def packages_in(model: Path, root: Path) -> dict[str, Path]:
     if in_xacro(model, model.name):
         hint = f"expand it, as `xacro {model.name} > robot.urdf` does, or use `ciris scene init` and `ciris scene add`, which expand it"
         raise SceneError("bundle_file", f"{model.name} is written in xacro, which the service does not run", hint=hint)
-    given = {}
+    given: dict[str, Path] = {}
     for name, files in taken_from(model).items():
         if not any(place.is_dir() for place in places_of(name, model, {})):
             given[name] = _lent(name, files, model, root)
