@@ -10,7 +10,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from certifier.model import Scene
-from db import events, jobs, pairs
+from db import events, jobs, pairs, steps
 from db.session import Database
 from db.states import IterationState
 from tests.dashboard.job_scenes import SLIDE, add_iteration
@@ -147,6 +147,8 @@ def test_a_proposal_tells_its_progress_beside_a_settled_iteration(
         job = jobs.lock(session, running)
         add_iteration(session, job, **iteration)
         pairs.iterations(session, running)[-1].state = IterationState.CERTIFIED
+        steps.add(session, job, "propose", {})
+        assert steps.claim(session, job, accepts=False, lease_seconds=600) is not None
         events.emit(session, job, events.NOTE, {"text": "proposing, 40 s, 31 faces"})
     page.goto(f"{url}/jobs/{running}")
     page.get_by_role("heading", name="Iteration 0: a box around the seed certified").wait_for()
