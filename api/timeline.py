@@ -38,6 +38,8 @@ class Piece(NamedTuple):
     state: str
     iteration: int | None = None
     pair: int | None = None
+    cells: int = 0
+    """At how many cells a search looked."""
 
 
 def of_job(db: Database, job_id: str, since: float, until: float | None) -> Timeline:
@@ -87,7 +89,9 @@ def _pieces(rows: Sequence[Any], start: datetime) -> Iterator[Piece]:
             begin = end - sum(pair["seconds"] for pair in data["pairs"])
             for pair in data["pairs"]:
                 ended = begin + pair["seconds"]
-                yield Piece(process, begin, ended, pair["seconds"], PAIRS, pair["state"], data["iteration"], pair["index"])
+                yield Piece(
+                    process, begin, ended, pair["seconds"], PAIRS, pair["state"], data["iteration"], pair["index"], pair.get("cells", 0)
+                )
                 begin = ended
         elif kind == "step" and data.get("seconds") is not None:
             yield Piece(process, end - data["seconds"], end, data["seconds"], data["kind"], data["state"])
@@ -100,7 +104,8 @@ def _pieces(rows: Sequence[Any], start: datetime) -> Iterator[Piece]:
 
 
 def _bar(piece: Piece, number: dict[str, int]) -> Bar:
-    return Bar(**{**piece._asdict(), "process": number[piece.process]}, pieces=1)
+    told = {key: value for key, value in piece._asdict().items() if key in Bar.model_fields}
+    return Bar(**{**told, "process": number[piece.process]}, pieces=1)
 
 
 def _binned(pieces: Sequence[Piece], number: dict[str, int], since: float, until: float) -> list[Bar]:
@@ -138,8 +143,8 @@ def _looked(rows: Sequence[Any], start: datetime) -> list[tuple[float, int]]:
 
 
 def _rates(pieces: Sequence[Piece], looked: Sequence[tuple[float, int]], since: float, until: float) -> list[Rate]:
-    """Returns how fast pairs were settled, in parts of the time, or how fast cells were looked at, from note to note."""
-    ends = [piece.end for piece in pieces if piece.work == PAIRS and since <= piece.end <= until]
+    """Returns how fast pairs were settled and cells looked at, in parts of the time; of a map how fast cells were, from note to note."""
+    settled = [piece for piece in pieces if piece.work == PAIRS and since <= piece.end <= until]
     if looked:
         steps = zip([(0.0, 0), *looked], looked, strict=False)
         known = [(a, b, (after - before) / (b - a)) for (a, before), (b, after) in steps if b > a and b >= since and a <= until]
@@ -152,11 +157,21 @@ def _rates(pieces: Sequence[Piece], looked: Sequence[tuple[float, int]], since: 
             for some in groups
         ]
     width = max(until - since, SHORTEST) / BINS
-    if not ends:
+    if not settled:
         return []
-    counts = Counter(min(int((end - since) / width), BINS - 1) for end in ends)
+    counts, cells = Counter[int](), Counter[int]()
+    for piece in settled:
+        place = min(int((piece.end - since) / width), BINS - 1)
+        counts[place] += 1
+        cells[place] += piece.cells
+    searched = any(piece.cells for piece in settled)
     return [
-        Rate(begin=since + place * width, end=since + (place + 1) * width, pieces=counts[place] / width, cells=None)
+        Rate(
+            begin=since + place * width,
+            end=since + (place + 1) * width,
+            pieces=counts[place] / width,
+            cells=cells[place] / width if searched else None,
+        )
         for place in range(BINS)
     ]
 

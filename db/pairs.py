@@ -521,4 +521,5 @@ def _public(index: int, part: int, result: PairResult, of_condition: bool) -> di
         "proved_distance": distance,
         "margin": distance,
         "seconds": result.seconds,
+        "cells": result.looked,
     }

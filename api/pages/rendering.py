@@ -30,8 +30,16 @@ def powers(unit: str) -> str:
     return re.sub(r"\^(\d+)", lambda power: power[1].translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")), unit)
 
 
+_STAGES = {"given": "the given polytope", "box": "a box around the seed", "cells": "cell by cell"}
+
+
+def stage(label: str) -> str:
+    """Returns the label of an iteration in words; the other labels are terms of the papers."""
+    return _STAGES.get(label, label)
+
+
 templates = Jinja2Templates(ROOT / "templates")
-templates.env.filters |= {"at_least_mm": at_least_mm, "at_most_mm": at_most_mm, "powers": powers}
+templates.env.filters |= {"at_least_mm": at_least_mm, "at_most_mm": at_most_mm, "powers": powers, "stage": stage}
 templates.env.filters |= {"degrees": math.degrees, "radians": math.radians}
 
 

@@ -76,10 +76,10 @@ async def create_scene(
 
     The body is multipart/form-data with one part, `bundle`: a zip of at most 64 MiB, which unpacks to at most 256 MiB and 1000 files. It
     holds the scene file and every file that this refers to: models (URDF, SDFormat, MJCF) and their meshes. All paths stay inside of the
-    zip. A plain zip of a directory is enough where exactly one file is called `scene.yaml`, or else only one is a YAML file. Otherwise a
-    file `bundle.json` says which one is the scene: `{"scene": "cell/left.yaml"}`. docs/scenes.md describes the scene file. `ciris scene
-    add` makes such a zip and sends it. Of a zip that has no scene file and one model (URDF, SDFormat or MJCF), the service drafts a scene,
-    as `ciris scene init` does.
+    zip. A plain zip of a directory is enough where exactly one file is called `scene.yaml`, or else only one YAML file has `directives`.
+    Otherwise a file `bundle.json` says which one is the scene: `{"scene": "cell/left.yaml"}`. docs/scenes.md describes the scene file.
+    `ciris scene add` makes such a zip and sends it. Of a zip that has no scene file and one model (URDF, SDFormat or MJCF), or in which
+    `bundle.json` names a model, the service drafts a scene, as `ciris scene init` does.
 
     A separate process reads the zip, so a bad file cannot harm the service. The same content is the same scene, whose id does not change.
     From now on its name means this scene, also where it meant another one.

@@ -40,7 +40,8 @@ class Rate(BaseModel):
     end: float = Field(description="Where it ends.")
     pieces: float = Field(description="Pairs, and parts of pairs, settled per second.")
     cells: float | None = Field(
-        description="Cells of the map looked at per second; null where the job does not tell how many there were.", examples=[4200.0]
+        description="Cells looked at per second, for the map or for the pairs; null where the job does not tell how many there were.",
+        examples=[4200.0],
     )
 
 

@@ -58,6 +58,7 @@ class PairResult:
     Attributes:
         stage: which part of the certifier settled the pair; None where the program could not be run.
         seconds: how long it took.
+        looked: at how many cells a search over partitions looked; 0 without one.
         margin: certified lower bound in metres of the distance between the padded bodies; None unless certified.
         detail: a sentence for people; empty when the outcome says it all.
         witness_s: (n,) a configuration in s: in contact when refuted, or at which the bodies are too close.
@@ -75,6 +76,7 @@ class PairResult:
     outcome: Outcome
     stage: Stage | None
     seconds: float = 0.0
+    looked: int = 0
     margin: float | None = None
     detail: str = ""
     witness_s: Array | None = None

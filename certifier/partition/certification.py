@@ -110,6 +110,7 @@ class CellCertification:
         check_interior(scene, self._area.ground, self._area.center)
         self._shared = Shared(self._area)
         self._broad_phase = BroadPhase(Kinematics.of(scene), self._attempt)
+        self._looked = 0
         self._last: tuple[int, Sequence[Sequence[bytes]], PartitionProof] | None = None
 
     def certify(self, index: int, cells: int, cut_off: CutOff = CutOff.CONTACTS, former: PartitionProof | None = None) -> PairResult:
@@ -120,10 +121,10 @@ class CellCertification:
             cut_off: which points of open cells the result names, because they will be cut off.
             former: a proof about bodies that were much like these, whose cells and planes are tried first; None where there is none.
         """
-        start, pair, volumes = time.perf_counter(), self._scene.pairs[index], self._volumes(index)
+        start, pair, volumes, self._looked = time.perf_counter(), self._scene.pairs[index], self._volumes(index), 0
         names = [name for volume in volumes for name in volume.geometries]
         result = self._broad_phase.find(pair, names) or self._begin(volumes, cells, cut_off, former)
-        return replace(result, seconds=time.perf_counter() - start)
+        return replace(result, seconds=time.perf_counter() - start, looked=self._looked)
 
     def go_on(
         self, index: int, cells: int, left: Sequence[bytes], part: int = 0, parts: int = 1, cut_off: CutOff = CutOff.CONTACTS
@@ -142,7 +143,7 @@ class CellCertification:
         contacts = scouted(self._area, search.bodies, 1 + part) if part < LOOKING else []
         report = search.run(given, cells)
         result = self._left(search, volumes, given, replace(report, contacts=contacts + report.contacts), cut_off)
-        return replace(result, seconds=time.perf_counter() - start)
+        return replace(result, seconds=time.perf_counter() - start, looked=report.cells)
 
     def put_together(self, index: int, rounds: Sequence[Sequence[bytes]], part: int = 0, parts: int = 1) -> PairResult:
         """Certifies a part of a pair of which no cell is open any more; the pair is certified when all its parts are.
@@ -168,7 +169,7 @@ class CellCertification:
 
     def _attempt(self, volumes: Volumes) -> PairResult | None:
         search, root = Search(self._area, self._shared, volumes, self._keep), Node()
-        search.run([OpenCell(root, self._area.lower, self._area.upper)], GROUP_CELLS)
+        self._looked += search.run([OpenCell(root, self._area.lower, self._area.upper)], GROUP_CELLS).cells
         if any(node.kind == OPEN for node in root.preorder()):
             return None
         result = self._verified(self._proof(search, volumes, root))
@@ -180,6 +181,7 @@ class CellCertification:
         root = Node() if former is None else try_again(area, search, volumes, former)
         given = [OpenCell(root, area.lower, area.upper)]
         report = Report(contacts=contacts) if contacts else search.run(root.open_cells(area.lower, area.upper), cells)
+        self._looked += report.cells
         if any(node.kind == OPEN for node in root.preorder()):
             if self._keep is None and not report.contacts:  # where faces are added, every round looks again
                 looks = (scouted(area, search.bodies, seed) for seed in range(1, 1 + LOOKS_AGAIN))

@@ -1,7 +1,7 @@
 """A bundle is a scene in one file, to be sent to a service: a zip of the scene file and of everything that it refers to.
 
-``bundle.json`` names the scene file. A zip without it has one ``scene.yaml``, or one YAML file. All paths in the zip are relative to one
-directory that holds every file.
+``bundle.json`` names the scene file, or a robot's model for which a scene is drafted. A zip without it has one ``scene.yaml``, one YAML
+file with directives, or one model. All paths in the zip are relative to one directory that holds every file.
 """
 
 from __future__ import annotations
@@ -108,8 +108,8 @@ def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Scene:
     """Returns the scene in a bundle from a stranger. A child process unpacks it within limits, checks it and parses it.
 
     Raises:
-        SceneError: ``bundle_too_large``, ``bundle_zip``, ``bundle_path``, ``bundle_file``, ``bundle_uri``, ``bundle_xml``,
-            ``bundle_text``, or what :func:`load_scene` raises.
+        SceneError: ``bundle_too_large``, ``bundle_zip``, ``bundle_choice``, ``bundle_path``, ``bundle_file``, ``bundle_uri``,
+            ``bundle_xml``, ``bundle_text``, ``scene_package``, or what :func:`load_scene` raises.
     """
     from certifier.model import Scene
 

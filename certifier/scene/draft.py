@@ -112,12 +112,11 @@ def draft(
     head = _head(out, robot, found, arguments or {}, directory)
     add = {name: f"  - add_model: {{name: {quoted(name)}, file: {quoted(_relative(path, directory))}}}" for name, path in models.items()}
     own = [*parts][: 1 + len(mounts)]
-    semantics = srdf or _beside(robot)
+    semantics = srdf or beside_model(robot)
     held = _inventory("\n".join([head, *add.values()]), models, {} if semantics is None else {own[0]: semantics}, directory)
     head = "\n".join([head, *_directives(add, parts, own, held), *_limits(held), *_fix(held)]) + "\n"
-    head, said = _with_srdf(head, semantics, semantics is srdf, robot, own[0], directory)
+    head, scene, said = _with_srdf(head, semantics, semantics is srdf, robot, own[0], directory)
     notes += said
-    scene = _loaded(head, directory)
     if more := hulls(scene) + vertices(scene, SceneFile.max_vertices):
         head += more
         scene = _loaded(head, directory)
@@ -142,28 +141,29 @@ def _always(scene: Scene, configurations: Iterable[Array]) -> dict[Pair, float]:
     return least
 
 
-def _beside(robot: Path) -> Path | None:
+def beside_model(robot: Path) -> Path | None:
     """Returns the SRDF file beside a robot's model; None where there is none."""
     return next(filter(Path.is_file, [robot.with_suffix(".srdf"), robot.parent.parent / "srdf" / f"{robot.stem}.srdf"]), None)
 
 
-def _with_srdf(head: str, file: Path | None, given: bool, robot: Path, name: str, directory: Path) -> tuple[str, list[str]]:
-    """Returns the beginning of a scene file with the robot's SRDF file, if there is one, and sentences that say so.
+def _with_srdf(head: str, file: Path | None, given: bool, robot: Path, name: str, directory: Path) -> tuple[str, Scene, list[str]]:
+    """Returns the beginning of a scene file with the robot's SRDF file, if there is one, its scene, and sentences that say so.
 
     A file that was not given, and that does not fit to the model, is left out.
     """
     if file is None:
         among = sorted(path.name for path in (robot.absolute().parent.parent / "srdf").glob("*.srdf"))
-        return head, [f"not used: {', '.join(among)} in ../srdf of the model; name one with --srdf"] if among else []
+        said = [f"not used: {', '.join(among)} in ../srdf of the model; name one with --srdf"] if among else []
+        return head, _loaded(head, directory), said
     text = f"{head}# Pairs that MoveIt does not check, and named configurations:\nsrdf: {{{quoted(name)}: "
     text += f"{quoted(_relative(file, directory))}}}\n"
     try:
-        _loaded(text, directory)
+        scene = _loaded(text, directory)
     except SceneError as error:
         if given or not (error.field or "").startswith("srdf"):
             raise
-        return head, [f"not used: {file}, which is beside the model: {error.message}"]
-    return text, [] if given else [f"{file} is beside the model, and the draft uses it"]
+        return head, _loaded(head, directory), [f"not used: {file}, which is beside the model: {error.message}"]
+    return text, scene, [] if given else [f"{file} is beside the model, and the draft uses it"]
 
 
 def _free(scene: Scene, middle: Array, random: Array, always: set[Pair]) -> Array | None:

@@ -21,6 +21,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from certifier.errors import SceneError
 from certifier.model import Array
+from certifier.scene.once import once
 
 _FLAT = 1e-5
 """A hull that is thinner than this fraction of its size counts as flat, and gets this fraction as its half thickness."""
@@ -44,6 +45,7 @@ def hull_vertices(points: Array) -> Array:
         return np.unique(points, axis=0)
 
 
+@once
 def outer(points: Array, max_vertices: int) -> tuple[Array, float, int]:
     """Finds at most ``max_vertices`` >= 8 vertices whose convex hull contains every one of points (k, 3), metres.
 

@@ -40,7 +40,7 @@ def packages_of(
     """
 
     def at(name: str) -> list[Path]:
-        return [given[name]] if name in given else list(_places(name, model.absolute(), environment))
+        return [given[name]] if name in given else list(places_of(name, model, environment))
 
     found: dict[str, Path] = {}
     said, expanded = [], None
@@ -69,10 +69,20 @@ def packages_of(
     return found, said
 
 
-def _places(name: str, model: Path, environment: Mapping[str, str]) -> Iterator[Path]:
-    """Yields the directories that are the package, the nearest first."""
+def taken_from(model: Path) -> dict[str, list[str]]:
+    """Returns the packages that a model names, each with the paths in it that the model names."""
+    found: dict[str, list[str]] = {}
+    for reference in references(model):
+        if reference.startswith(_SCHEMES):
+            name, _, path = reference.partition("://")[2].partition("/")
+            found[name] = list(dict.fromkeys([*found.get(name, []), path]))
+    return found
+
+
+def places_of(name: str, model: Path, environment: Mapping[str, str]) -> Iterator[Path]:
+    """Yields the directories that are a package, the nearest to the model first."""
     seen = set()
-    for place in _all_places(name, model, environment):
+    for place in _all_places(name, model.absolute(), environment):
         if place.resolve() not in seen:
             seen.add(place.resolve())
             yield place

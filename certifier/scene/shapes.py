@@ -18,6 +18,7 @@ from certifier.model import Array
 from certifier.scene.decomposition.solid import closed, fault, welded
 from certifier.scene.hollow import beyond_mesh
 from certifier.scene.hull import outer
+from certifier.scene.once import once
 
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 
@@ -92,7 +93,13 @@ def polytope(shape: dict[str, Any], points: Array, triangles: NDArray[np.int64],
     if shape["kind"] == "convex":
         return Body(vertices, 0.0, shape, f"convex -> {hull}" if inflation else None, inflation)
     beyond = beyond_mesh(points, triangles)
-    return Body(vertices, 0.0, shape, f"mesh -> {hull}", inflation, beyond, fault(*closed(*welded(points, triangles))) if beyond else None)
+    return Body(vertices, 0.0, shape, f"mesh -> {hull}", inflation, beyond, _fault(points, triangles) if beyond else None)
+
+
+@once
+def _fault(points: Array, triangles: NDArray[np.int64]) -> str | None:
+    """Returns why a mesh bounds no solid, for people; None if it does."""
+    return fault(*closed(*welded(points, triangles)))
 
 
 def half_space(center: Array, reach: float) -> Body:

@@ -8,14 +8,14 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from certifier.errors import SceneError
-from certifier.names import escaped
+from certifier.model import Scene
 from certifier.scene.bundle import INDEX, SMALLER, BundleLimits
 from certifier.scene.draft import draft
 from certifier.scene.file import read_scene_file
 from certifier.scene.macros import in_xacro
-from certifier.scene.packages import packages_of
 from certifier.scene.parse import parse
 from certifier.scene.references import is_mjcf, is_read, references, resolve
+from certifier.scene.robot import MODELS, keep_only, only_scene, packages_in
 
 _DEPTH = 32
 _BELOW = "keep the file below the directory of the model"
@@ -23,12 +23,6 @@ _PACK = "make bundles with `ciris scene add`"
 _CHUNK = 2**20
 _LITTER = {"__MACOSX", ".DS_Store"}
 """A Mac puts these into every zip. They are left out."""
-SCENE_FILE = "scene.yaml"
-"""A zip without an index has its scene in this file."""
-_NAMED = 3
-"""At most this many files are named where there are several."""
-MODELS = (".urdf", ".sdf", ".mjcf")
-"""A zip without a scene file is taken for the robot whose model it has."""
 
 
 def parse_bundle(payload: dict[str, Any]) -> dict[str, Any]:
@@ -39,29 +33,25 @@ def parse_bundle(payload: dict[str, Any]) -> dict[str, Any]:
     """
     root = Path(payload["root"])
     found = root / unpack(Path(payload["archive"]), root, BundleLimits(**payload["limits"]))
-    scene = _drafted(root, found) if found.suffix in MODELS else found
-    check_bundle(root, scene)
-    return parse({"path": str(scene)})
+    if found.suffix in MODELS or is_mjcf(found):
+        return _drafted(root, found).to_document()
+    check_bundle(root, found)
+    return parse({"path": str(found)})
 
 
-def _drafted(root: Path, model: Path) -> Path:
-    """Writes a scene file for a robot's model that came without one, as ``ciris scene init`` does, and returns its path.
+def _drafted(root: Path, model: Path) -> Scene:
+    """Returns the scene of a robot's model that came without one, as ``ciris scene init`` drafts it.
 
     Drake sees the model once it has passed with a scene file that has nothing but the model.
     """
     scene = root / f"{model.stem}.yaml"
-    try:
-        packages = packages_of(model, {}, {}, {}, root)[0]
-    except SceneError as error:
-        if error.code == "scene_package":
-            error.hint = "put each package into the zip, as a folder of its name with all files that the model takes from it"
-        raise
+    packages = packages_in(model, root)
+    keep_only(model, root, packages)
     directive = {"add_model": {"name": "model", "file": model.relative_to(root).as_posix()}}
     besides = {"packages": {name: path.relative_to(root).as_posix() for name, path in packages.items() if path.is_relative_to(root)}}
     scene.write_text(json.dumps({"name": "draft", "directives": [directive], **(besides if packages else {})}), encoding="utf-8")
     check_bundle(root, scene)
-    scene.write_text(draft(model, [], scene, packages).text, encoding="utf-8")
-    return scene
+    return draft(model, [], scene, packages).scene
 
 
 def check_bundle(root: Path, scene: Path) -> None:
@@ -117,7 +107,7 @@ def unpack(bundle: Path, root: Path, limits: BundleLimits) -> str:
     """Writes the zip's files below root, and returns the path of the scene file.
 
     Raises:
-        SceneError: ``bundle_too_large``, ``bundle_zip``, ``bundle_path``.
+        SceneError: ``bundle_too_large``, ``bundle_zip``, ``bundle_choice``, ``bundle_path``.
     """
     try:
         with zipfile.ZipFile(bundle) as archive:
@@ -129,7 +119,7 @@ def unpack(bundle: Path, root: Path, limits: BundleLimits) -> str:
             for entry in entries:
                 left -= _extract(archive, entry, root, left)
         index = root / INDEX
-        scene = str(json.loads(index.read_text(encoding="utf-8"))["scene"]) if index.is_file() else _only_scene(root)
+        scene = str(json.loads(index.read_text(encoding="utf-8"))["scene"]) if index.is_file() else only_scene(root)
     except SceneError:
         raise
     except Exception:  # zipfile and the decompressors raise many kinds of error
@@ -137,26 +127,6 @@ def unpack(bundle: Path, root: Path, limits: BundleLimits) -> str:
         raise SceneError("bundle_zip", message, field="bundle", hint=_PACK) from None
     _checked_name(scene)
     return scene
-
-
-def _only_scene(root: Path) -> str:
-    """Returns the path of the scene file in a zip that somebody made of a directory, which names none; or of the only model there is."""
-    found = list(root.rglob(SCENE_FILE)) or list(root.rglob("*.yaml"))
-    if not found:
-        found = next((some for kind in MODELS if (some := list(root.rglob(f"*{kind}")))), [])
-    if not found and any(root.rglob("*.xacro")):
-        hint = "expand the xacro to a .urdf, or use `ciris scene init` and `ciris scene add`, which expand it"
-        raise SceneError("bundle_zip", "the zip has no scene file, and no model of a robot but in xacro", field="bundle", hint=hint)
-    if not found:
-        hint = f"add a {SCENE_FILE}, or a robot's model: {', '.join(MODELS)}"
-        raise SceneError("bundle_zip", "the zip has no scene file, and no model of a robot", field="bundle", hint=hint)
-    if len(found) > 1:
-        names = sorted(escaped(file.name)[:60] for file in found)
-        more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-        message = f"the zip has {len(names)} files that may be the scene file or the robot's model: {', '.join(names[:_NAMED])}{more}"
-        hint = f"leave one of them in it, or add a {SCENE_FILE} that says which models belong to the scene"
-        raise SceneError("bundle_zip", message, field="bundle", hint=hint)
-    return found[0].relative_to(root).as_posix()
 
 
 def _extract(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, root: Path, left: int) -> int:

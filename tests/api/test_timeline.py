@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import timedelta
 
 import pytest
@@ -43,7 +44,7 @@ def test_pairs_and_steps_are_told_with_their_process(client: TestClient, databas
         job = a_running_job(session, 3, failures=None)
         claim = pairs.claim(session, job, lease_seconds=60, batch_seconds=2.0)
         assert claim is not None
-        pairs.save(session, claim, {(0, 0): result(), (1, 0): result(Outcome.INCONCLUSIVE, 1.5)})
+        pairs.save(session, claim, {(0, 0): replace(result(), looked=30), (1, 0): replace(result(Outcome.INCONCLUSIVE, 1.5), looked=12)})
         steps.add(session, job, "propose", {})
         held = steps.claim(session, job, accepts=False, lease_seconds=60)
         assert held is not None
@@ -61,6 +62,7 @@ def test_pairs_and_steps_are_told_with_their_process(client: TestClient, databas
     assert [bar["end"] - bar["begin"] for bar in (first, second, step)] == pytest.approx([0.5, 1.5, 0.25])
     assert 10.0 < second["end"] <= told["seconds"]
     assert sum(rate["pieces"] * (rate["end"] - rate["begin"]) for rate in told["rates"]) == pytest.approx(2.0)
+    assert sum(rate["cells"] * (rate["end"] - rate["begin"]) for rate in told["rates"]) == pytest.approx(42.0)
     part = client.get(f"/v1/jobs/{job.id}/timeline", params={"since": 0, "until": second["begin"] - 0.1}).json()
     assert [bar["pair"] for bar in part["bars"]] == [0]
     assert client.get(f"/v1/jobs/{job.id}/timeline", params={"since": 2, "until": 1}).json()["field"] == "until"
@@ -90,6 +92,7 @@ def test_much_work_of_many_processes_is_told_together(client: TestClient, databa
         session.execute(insert(EventRow), rows)
     answer = client.get(f"/v1/jobs/{job.id}/timeline", params={"until": 10.0})
     told = answer.json()
+    assert {rate["cells"] for rate in told["rates"]} == {None}, "nobody has said how many cells there were"
     assert (len(told["processes"]), told["others"], told["together"]) == (MOST_PROCESSES, processes - MOST_PROCESSES, True)
     assert len(told["bars"]) <= MOST_PROCESSES * BINS
     assert len(answer.content) < 2**21

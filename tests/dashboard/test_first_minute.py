@@ -113,7 +113,7 @@ def test_two_robots_without_a_scene_are_refused(client: TestClient, tmp_path: Pa
     for name in ("one", "two"):
         shutil.copy(ARM, tmp_path / f"{name}.urdf")
     answer = client.post("/v1/scenes", files={"bundle": ("two.zip", zipped(tmp_path), "application/zip")})
-    assert (answer.status_code, answer.json()["code"]) == (422, "bundle_zip")
+    assert (answer.status_code, answer.json()["code"]) == (422, "bundle_choice")
     assert answer.json()["detail"].endswith("2 files that may be the scene file or the robot's model: one.urdf, two.urdf")
 
 
@@ -125,15 +125,14 @@ def test_a_zip_with_nothing_but_xacro_says_who_expands_it(client: TestClient, tm
 
 
 def test_a_zip_without_a_package_that_its_robot_names_says_what_to_put_there(client: TestClient, tmp_path: Path) -> None:
-    """The service looks into no variable of its own, tells no path of its own, and knows no option of the command."""
+    """The service looks into no variable of its own, tells no path of its own, and offers no option of the command."""
     mesh = '<collision><geometry><mesh filename="package://tools/hand/grip.obj"/></geometry></collision>'
     (tmp_path / "arm.urdf").write_text(f'<robot name="arm"><link name="base">{mesh}</link></robot>')
-    (tmp_path / "hand").mkdir()
-    (tmp_path / "hand/grip.obj").write_text("v 0 0 0\n")
     answer = client.post("/v1/scenes", files={"bundle": ("arm.zip", zipped(tmp_path), "application/zip")}).json()
     assert answer["code"] == "scene_package"
-    assert answer["detail"] == "arm.urdf names the package tools, which is not above it or in a workspace around it"
-    assert answer["hint"] == "put each package into the zip, as a folder of its name with all files that the model takes from it"
+    assert answer["detail"] == "arm.urdf takes a file from the package tools, and the zip has no hand/grip.obj"
+    hint = "make the zip of the folder that has the model and these files, or put the package into it, as a folder tools"
+    assert answer["hint"] == hint
 
 
 def test_a_model_that_leads_out_of_its_zip_is_refused_before_drake_sees_it(client: TestClient, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -24,7 +25,7 @@ def test_work_is_drawn_over_time_and_told_in_a_table(page: Any, url: str, databa
     section.scroll_into_view_if_needed()
     section.get_by_text("No process has finished any work for this job yet.").wait_for()
     settle(database, job_id, too_close(scene, 64), batch=0)
-    settle(database, job_id, certified(), batch=0)
+    settle(database, job_id, replace(certified(), looked=64), batch=0)
     bars = section.locator("svg.work rect")
     section.locator("svg.work rect.too_close").wait_for(timeout=20_000)
     assert bars.count() == 2
@@ -32,6 +33,8 @@ def test_work_is_drawn_over_time_and_told_in_a_table(page: Any, url: str, databa
     section.get_by_text("As a table").click()
     cells = section.locator("tbody td").all_text_contents()
     assert cells[:3] == [":".join(this_worker().split(":")[:2]), "2", "2.1 s"]
+    section.get_by_role("img", name="Pairs and parts of pairs settled per second").wait_for()
+    section.get_by_role("img", name="Cells looked at per second").wait_for()
     assert barriers(page) == []
     section.get_by_role("button", name="Closer").click()
     section.get_by_role("button", name="Farther").wait_for()
@@ -55,6 +58,8 @@ def test_the_page_of_a_map_says_what_is_proved_of_each_path(page: Any, url: str,
     assert page.get_by_text("the region's proof").count() == 0
     page.get_by_role("region", name="Work over time", exact=True).scroll_into_view_if_needed()
     page.locator("svg.work rect.step").first.wait_for()
+    page.get_by_role("img", name="Cells looked at per second").wait_for()
+    assert page.get_by_role("img", name="settled per second").count() == 0, "a map has no pairs"
 
 
 def test_the_cells_of_a_condition_are_no_two_bodies(page: Any, url: str, client: TestClient, upright: Scene, database: Database) -> None:

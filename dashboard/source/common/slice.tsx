@@ -172,9 +172,16 @@ function clamp(value: number, { lower, upper }: SliceAxis): number {
   return Math.min(Math.max(value, lower), upper);
 }
 
+/** A share in whole percent; what is there is never said to be nothing, and what is not all never to be all. */
+function rounded(share: number): string {
+  const percent = Math.round(100 * share);
+  if (percent === 0 && share > 0) return "less than 1 %";
+  return percent === 100 && share < 1 ? "more than 99 %" : `${percent} %`;
+}
+
 function summary({ rows, regions }: SliceResponse): string {
   const signs = rows.join("");
-  const percent = (sign: string): string => `${Math.round((100 * signs.split(sign).length - 100) / signs.length)} %`;
+  const percent = (sign: string): string => rounded((signs.split(sign).length - 1) / signs.length);
   const many = regions.length === 1 ? "1 region is" : `${regions.length} regions are`;
   return `${percent("o")} of this slice is certified, ${percent("#")} in collision, by samples; ${many} in it.`;
 }

@@ -41,6 +41,66 @@ export function zip(entries: Entry[]): Blob {
   return new Blob([...parts, ...directory, bytes([0x06054b50, 4], [0, 2], [0, 2], [entries.length, 2], [entries.length, 2], [size, 4], [at, 4], [0, 2])]);
 }
 
+/** Little-endian numbers of a zip, at a place in its bytes. */
+class Numbers {
+  private readonly view: DataView;
+
+  constructor(readonly bytes: Uint8Array<ArrayBuffer>) {
+    this.view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  }
+
+  two(at: number): number {
+    return this.view.getUint16(at, true);
+  }
+
+  four(at: number): number {
+    return this.view.getUint32(at, true);
+  }
+}
+
+const END = 0x06054b50;
+const END_BYTES = 22;
+
+/** Where the directory of a zip ends; its last record begins there. */
+function endOf(data: Numbers): number {
+  for (let at = data.bytes.length - END_BYTES; at >= 0; at--) if (data.four(at) === END) return at;
+  return -1;
+}
+
+/** The paths in a zip; none where it cannot be read. */
+export async function pathsIn(file: Blob): Promise<string[]> {
+  const data = new Numbers(new Uint8Array(await file.arrayBuffer()));
+  const end = endOf(data);
+  const found: string[] = [];
+  for (let k = 0, at = end < 0 ? 0 : data.four(end + 16); end >= 0 && k < data.two(end + 10) && at + 46 <= end; k++) {
+    const length = data.two(at + 28);
+    found.push(new TextDecoder().decode(data.bytes.subarray(at + 46, at + 46 + length)));
+    at += 46 + length + data.two(at + 30) + data.two(at + 32);
+  }
+  return found;
+}
+
+/** A zip with one more file, stored as it is. */
+async function withFile(file: File, path: string, text: string): Promise<File> {
+  const data = new Numbers(new Uint8Array(await file.arrayBuffer()));
+  const end = endOf(data);
+  const begin = data.four(end + 16);
+  const more = new Uint8Array(await zip([{ path, data: new TextEncoder().encode(text) }]).arrayBuffer());
+  const own = endOf(new Numbers(more));
+  const cut = new Numbers(more).four(own + 16);
+  // Its directory says where the file begins, and follows that of the zip.
+  const entry = more.slice(cut, own);
+  new DataView(entry.buffer).setUint32(42, begin, true);
+  const count = data.two(end + 10) + 1;
+  const last = bytes([END, 4], [0, 2], [0, 2], [count, 2], [count, 2], [end - begin + entry.length, 4], [begin + cut, 4], [0, 2]);
+  return new File([data.bytes.subarray(0, begin), more.subarray(0, cut), data.bytes.subarray(begin, end), entry, last], file.name, { type: file.type });
+}
+
+/** The zip as one that says which of its files is the scene, or the robot's model. */
+export function saying(file: File, scene: string): Promise<File> {
+  return withFile(file, "bundle.json", JSON.stringify({ scene }));
+}
+
 /** A file with its path: below the folder that was chosen or dropped, if it was one. */
 export interface Chosen {
   path: string;

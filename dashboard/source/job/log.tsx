@@ -2,7 +2,7 @@
 import { useState } from "preact/hooks";
 import type { Event } from "../common/schema";
 import { duration, plural } from "./outcomes";
-import { stepOf } from "./steps";
+import { stageOf, stepOf } from "./steps";
 import type { JobStore } from "./store";
 
 const STEP: Record<string, string> = { open: "waits for a worker", running: "begun" };
@@ -50,7 +50,7 @@ function sentence({ kind, data }: Event, subject: string): string {
       return `The job ${IS[state] ?? state}${why}.`;
     }
     case "iteration": {
-      const one = `Iteration ${number} (${text("label")})`;
+      const one = `Iteration ${number} (${stageOf(text("label"))})`;
       if (state !== "running") return `${one} ${ITERATION[state] ?? state}.`;
       const together = where("together", `, of which ${data.together} share the proof of another one`);
       return `${one} begins with ${plural(Number(data.pairs ?? 0), "pair")} to prove${together}${where("reused", `; ${data.reused} more keep their proofs`)}.`;

@@ -5,6 +5,7 @@ import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/ho
 import type { IterationStates, PairInfo } from "../common/schema";
 import { address, go } from "./route";
 import { CERTIFIED, OUTCOMES, atLeast, badness, duration, facts, plural } from "./outcomes";
+import { stageOf } from "./steps";
 import type { JobStore } from "./store";
 
 const HEAD = 32;
@@ -261,7 +262,7 @@ function Grid({ store, version, rows, memory }: { store: JobStore; version: numb
               class="cell"
               key={one.index}
               aria-colindex={from + i + 2}
-              title={`${one.label}, ${one.faces} faces, ${one.state}`}
+              title={`${stageOf(one.label)}, ${one.faces} faces, ${one.state}`}
               style={{ left: `${named + (from + i) * wide}px`, width: `${wide}px` }}
             >
               <span class="sr">iteration </span>

@@ -5,6 +5,12 @@ export function stepOf(kind: string, subject: string): string {
   return STEPS[kind]?.(subject) ?? kind;
 }
 
+/** The label of an iteration in words; the other labels are terms of the papers. */
+export function stageOf(label: string): string {
+  return STAGES[label] ?? label;
+}
+
+const STAGES: Record<string, string> = { given: "the given polytope", box: "a box around the seed", cells: "cell by cell" };
 const starting = (): string => "Looking for a starting region around the seed";
 const STEPS: Record<string, (subject: string) => string> = {
   propose: starting,

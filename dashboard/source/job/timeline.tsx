@@ -228,18 +228,18 @@ function Chart({ told, store, subject, setRange }: { told: Told; store: JobStore
           {plural(told.others, "more process")}, which worked less, {told.others === 1 ? "is" : "are"} left out.
         </p>
       )}
-      {told.rates.length > 0 && <Rates told={told} x={x} />}
+      {told.rates.some(({ pieces }) => pieces > 0) && <Rates told={told} x={x} words="Pairs and parts of pairs settled" of={(rate) => rate.pieces} />}
+      {told.rates.some(({ cells }) => cells !== null) && <Rates told={told} x={x} words="Cells looked at" of={(rate) => rate.cells ?? 0} />}
     </figure>
   );
 }
 
-function Rates({ told, x }: { told: Told; x: (seconds: number) => number }) {
-  const cells = told.rates[0]!.cells !== null;
-  const values = told.rates.map((rate) => (cells ? rate.cells! : rate.pieces));
+function Rates({ told, x, words: what, of }: { told: Told; x: (seconds: number) => number; words: string; of: (rate: Told["rates"][number]) => number }) {
+  const values = told.rates.map(of);
   const most = Math.max(...values) || 1;
   const y = (value: number): number => RATE * (1 - (0.94 * value) / most);
   const line = told.rates.map((rate, i) => `${i ? "L" : "M"}${x(rate.begin)},${y(values[i]!)}H${x(rate.end)}`).join("");
-  const words = `${cells ? "Cells looked at" : "Pairs and parts of pairs settled"} per second; at most ${Number(most.toPrecision(2)).toLocaleString("en")}`;
+  const words = `${what} per second; at most ${Number(most.toPrecision(2)).toLocaleString("en")}`;
   return (
     <>
       <svg class="chart rates" viewBox={`0 0 ${WIDTH} ${RATE}`} preserveAspectRatio="none" role="img" aria-label={words}>

@@ -1,7 +1,7 @@
 // The scene to work on: one that is stored, or one that is uploaded now.
 import { useEffect, useState } from "preact/hooks";
-import { said, upload } from "../common/api";
-import { chosen as chosenFiles, dropped, nameOf, packed, type Chosen } from "../common/zip";
+import { said, ServiceError, upload } from "../common/api";
+import { chosen as chosenFiles, dropped, nameOf, packed, pathsIn, saying, type Chosen } from "../common/zip";
 import type { SceneDetail, SceneModel } from "../common/schema";
 
 export type Scene = Pick<SceneDetail, "id" | "name" | "names" | "joints" | "pairs" | "warnings">;
@@ -21,27 +21,57 @@ export function named({ id, name, names }: Scene): string {
   return names.includes(name) ? name : (names[0] ?? id);
 }
 
+/** A zip with several files of which each may be the scene or the robot, by what they may be. */
+interface Several {
+  file: File;
+  groups: [string, string[]][];
+}
+
+const GROUPS: [string, RegExp][] = [
+  ["Models of robots", /\.(urdf|sdf|mjcf)$/i],
+  ["Scene files", /\.yaml$/i],
+  ["Models of MuJoCo", /\.xml$/i],
+];
+
+async function several(file: File): Promise<Several> {
+  const paths = (await pathsIn(file)).filter((path) => !/^__MACOSX|(^|\/)package\.xml$/.test(path));
+  return { file, groups: GROUPS.map(([title, kind]): [string, string[]] => [title, paths.filter((path) => kind.test(path)).sort()]).filter(([, found]) => found.length > 0) };
+}
+
+/** Where in a scene file something is wrong. */
+function where(reason: unknown): string {
+  return reason instanceof ServiceError && reason.field && reason.field !== "bundle" ? `${reason.field}: ` : "";
+}
+
 export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props) {
   const [sending, setSending] = useState<string | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
   const [added, setAdded] = useState<SceneDetail | null>(null);
+  const [choice, setChoice] = useState<Several | null>(null);
   const offers = scenes.flatMap((scene) => scene.names.map((name) => ({ ...scene, name })));
   // An address may give a scene otherwise, such as by its id.
   if (model && chosen !== null && !offers.some(({ name }) => name === chosen)) offers.unshift({ id: model.scene, name: chosen, names: [], joints: model.q_star.length, pairs: model.pairs.length, warnings: 0 });
-  const send = async (files: Chosen[]): Promise<void> => {
-    if (files.length === 0) return;
-    const name = nameOf(files);
+  const send = async (name: string, file: () => Promise<File>): Promise<void> => {
     setSending(name);
     setProblem(null);
     setAdded(null);
+    let whole: File | null = null;
     try {
-      const scene = await upload<SceneDetail>("/v1/scenes", "bundle", await packed(files));
+      whole = await file();
+      const scene = await upload<SceneDetail>("/v1/scenes", "bundle", whole);
       setAdded(scene);
+      setChoice(null);
       onUpload(scene);
     } catch (reason) {
-      setProblem(`${name} is no scene that can be used: ${said(reason)}`);
+      const found = whole && reason instanceof ServiceError && reason.code === "bundle_choice" ? await several(whole) : null;
+      if (found?.groups.length) setChoice(found);
+      else setProblem(`${name} is no scene that can be used: ${where(reason)}${said(reason)}`);
     }
     setSending(null);
+  };
+  const take = async (files: Chosen[]): Promise<void> => {
+    setChoice(null);
+    if (files.length > 0) await send(nameOf(files), () => packed(files));
   };
   // A scene may be dropped anywhere, but where the form asks for another file.
   useEffect(() => {
@@ -49,7 +79,7 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
     const drop = (event: DragEvent): void => {
       if (event.defaultPrevented || !event.dataTransfer) return;
       event.preventDefault();
-      void dropped(event.dataTransfer).then(send, (reason: unknown) => setProblem(`What was dropped cannot be read: ${String(reason)}`));
+      void dropped(event.dataTransfer).then(take, (reason: unknown) => setProblem(`What was dropped cannot be read: ${String(reason)}`));
     };
     document.addEventListener("dragover", over);
     document.addEventListener("drop", drop);
@@ -72,11 +102,11 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
       <p>
         <span class="file">
           <label for="new-upload">or upload one</label>
-          <input id="new-upload" type="file" accept=".zip,.urdf,.sdf,.mjcf,application/zip" disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void send(chosenFiles(event.currentTarget.files))} />
+          <input id="new-upload" type="file" accept=".zip,.urdf,.sdf,.mjcf,application/zip" disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void take(chosenFiles(event.currentTarget.files))} />
         </span>
         <span class="file">
           <label for="new-folder">or its folder</label>
-          <input id="new-folder" type="file" {...{ webkitdirectory: true }} disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void send(chosenFiles(event.currentTarget.files))} />
+          <input id="new-folder" type="file" {...{ webkitdirectory: true }} disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void take(chosenFiles(event.currentTarget.files))} />
         </span>
       </p>
       <p class="quiet small" id="new-upload-says">
@@ -85,6 +115,15 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
       <div role="status">
         {sending && <p class="notice">Reading {sending} …</p>}
         {problem && <p class="notice bad">{problem}</p>}
+        {choice && (
+          <p class="notice">
+            <label for="new-which">{choice.file.name} has several robots or scenes. Which one?</label>{" "}
+            <select id="new-which" value="" onChange={({ currentTarget: { value } }) => void send(value, () => saying(choice.file, value))}>
+              <option value="">choose …</option>
+              {choice.groups.map(([title, paths]) => <optgroup label={title} key={title}>{paths.map((path) => <option key={path}>{path}</option>)}</optgroup>)}
+            </select>
+          </p>
+        )}
         {added && (
           <p class="notice">
             {added.name} is stored, with {added.joints} {added.joints === 1 ? "joint" : "joints"} and {added.pairs} {added.pairs === 1 ? "pair" : "pairs"}.

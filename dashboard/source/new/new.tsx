@@ -140,7 +140,7 @@ function Start({ given, model, parts, keyed, first }: Props & { given: string; m
       const { contacts } = await post<ContactsResponse>("/v1/planning/contacts", { scene: model.scene, q: [q] });
       if (wish.kind === "grow" && contacts[0]!.pairs?.length) {
         setSending(false);
-        return setProblem("The robot is in collision there, so no region can hold the configuration. Move it first.");
+        return setProblem("The robot is in collision there, so no region can hold the configuration. Move it first: Free one near by, below the sliders, does so.");
       }
       const stands = await blocked(model, held);
       if (stands) {

@@ -204,10 +204,12 @@ def test_a_search_that_runs_out_of_cells_goes_on_from_where_it_was():
     shared = CellCertification(scene, polytope, box=box_)
     at_once = shared.certify(0, CELLS)
     check_certified(scene, polytope, 0, at_once)
+    assert at_once.looked > 1
     rounds, result = [], shared.certify(0, 1)
     while result.open_cells and len(rounds) < 50:
         rounds.append([result.subtrees])
         result = shared.go_on(0, 1, rounds[-1])
+        assert result.looked == 1
         assert result.outcome is Outcome.INCONCLUSIVE
         assert result.margin is None
     assert result.detail == "no cell is open; the cells are yet to be put together and verified"

@@ -171,7 +171,7 @@ def test_what_a_package_has_beside_its_robot_is_deleted_before_drake_sees_anythi
         (b"not a zip", "bundle_zip"),
         (zipped({"arm.obj": ""}), "bundle_zip"),
         (zipped({"arm.urdf": "<robot name='a'>"}), "bundle_xml"),
-        (zipped({"a.yaml": SCENE, "b.yaml": SCENE}), "bundle_zip"),
+        (zipped({"a.yaml": SCENE, "b.yaml": SCENE}), "bundle_choice"),
         (zipped({"bundle.json": "[]"}), "bundle_zip"),
         (zipped({"bundle.json": "{"}), "bundle_zip"),
         (zipped({"bundle.json": '{"scene": 3}'}), "scene_not_found"),

@@ -12,6 +12,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from certifier.errors import RegionError
+from certifier.scene import hollow
 from certifier.scene.hollow import beyond, beyond_mesh
 from certifier.seeding.free import check_free
 from tests.certifier.scene.workshop import SCENE, parsed, write
@@ -130,3 +131,15 @@ def test_the_hull_of_parts_is_measured_from_the_parts(tmp_path):
     scene = parsed(write(tmp_path, SCENE, more=more, extra="hulls: [arm/claw]\n"))
     assert 0.087 < beyond(scene, "arm/claw/hull") <= 0.09
     assert any("arm/claw/hull: the hull reaches at least" in warning and "beyond its parts" in warning for warning in scene.warnings)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_point_that_is_spread_over_the_hull_is_farther(seed: int) -> None:
+    """Points that cannot be the farthest are left out, by their distances from the middles of triangles."""
+    random = np.random.default_rng(seed)
+    points, triangles = random.normal(size=(40, 3)), random.integers(0, 40, (60, 3))
+    corners = points[triangles]
+    distances = hollow._Distances(corners)
+    farthest = max(distances.of(weights @ triangle) for weights, triangle in hollow._spread(hollow._faces(points), hollow._POINTS))
+    assert farthest > 0.1
+    assert beyond_mesh(points, triangles) >= farthest

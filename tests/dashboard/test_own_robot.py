@@ -1,0 +1,161 @@
+"""A robot of one's own: what people have of it on their disks is taken as it is, and what cannot be taken says what to do."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from certifier.model import Scene
+from db import events, jobs, pairs, steps
+from db.session import Database
+from db.states import IterationState
+from tests.dashboard.job_scenes import SLIDE, add_iteration
+
+LIMITS = "joint_limits:\n  shoulder: {max_velocity: !degrees 90}\n"
+TETRAHEDRON = "v 0 0 0\nv 0.05 0 0\nv 0 0.05 0\nv 0 0 0.05\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+def urdf(name: str, mesh: str = "package://arm_description/meshes/link.obj") -> str:
+    """A robot of two links, whose second one is a mesh that turns half a metre away from the first."""
+    return f"""<robot name="{name}"><link name="base"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+<link name="middle"/><link name="tip"><collision><origin xyz="0.5 0 0"/><geometry><mesh filename="{mesh}"/></geometry></collision></link>
+<joint name="pan" type="revolute"><parent link="base"/><child link="middle"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+<joint name="lift" type="revolute"><parent link="middle"/><child link="tip"/><axis xyz="0 1 0"/>
+<limit lower="-2" upper="2" effort="1" velocity="1"/></joint></robot>"""
+
+
+def packed(directory: Path, **files: str) -> Path:
+    """A zip of files; in names, two underscores stand for a slash, and three for a dot."""
+    path = directory / "mine.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, text in files.items():
+            archive.writestr(name.replace("___", ".").replace("__", "/"), text)
+    return path
+
+
+def upload(page: Any, url: str, path: Path) -> None:
+    page.goto(f"{url}/new")
+    page.get_by_label("or upload one").set_input_files(path)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "model", "link"),
+    [
+        ("package://arm_description/meshes/link.obj", "arm_description__urdf__arm___urdf", "arm_description__meshes__link___obj"),
+        ("package://arm_description/meshes/link.obj", "urdf__arm___urdf", "meshes__link___obj"),
+        ("package://robots/models/arm/meshes/link.obj", "arm__arm___urdf", "arm__meshes__link___obj"),
+    ],
+    ids=["whole", "without its folder", "a folder inside of it"],
+)
+def test_the_zip_of_a_package_is_taken_whatever_part_of_it_it_is(
+    page: Any, url: str, client: TestClient, tmp_path: Path, mesh: str, model: str, link: str
+) -> None:
+    """A package has settings in YAML, other models with references to nowhere, and xacro. None of it is about the robot."""
+    beside = {
+        "config__joint_limits___yaml": LIMITS,
+        "config__controllers___yaml": "a: &a 1\nb: *a\n",
+        "worlds__sun___xml": '<uri file="/x"/>',
+    }
+    upload(page, url, packed(tmp_path, **{model: urdf("arm", mesh), link: TETRAHEDRON, **beside}))
+    page.get_by_text("arm is stored, with 2 joints and 1 pair").wait_for()
+    page.locator(".slider").nth(1).wait_for()
+    (scene,) = client.get("/v1/scenes").json()["scenes"]
+    assert (scene["name"], scene["joints"], scene["pairs"]) == ("arm", 2, 1)
+
+
+def test_a_zip_with_several_robots_asks_for_one(
+    page: Any, url: str, client: TestClient, tmp_path: Path, complaints: list[str], barriers: Any
+) -> None:
+    robots = {f"arm_description__urdf__{name}___urdf": urdf(name) for name in ("left", "right")}
+    upload(page, url, packed(tmp_path, **robots, arm_description__meshes__link___obj=TETRAHEDRON))
+    which = page.get_by_label("mine.zip has several robots or scenes. Which one?")
+    which.wait_for()
+    assert barriers(page) == []
+    assert which.locator("option").all_text_contents()[1:] == [f"arm_description/urdf/{name}.urdf" for name in ("left", "right")]
+    which.select_option("arm_description/urdf/right.urdf")
+    page.get_by_text("right is stored, with 2 joints and 1 pair").wait_for()
+    assert which.count() == 0
+    assert [scene["name"] for scene in client.get("/v1/scenes").json()["scenes"]] == ["right"]
+    complaints.clear()
+
+
+def test_a_zip_with_several_scenes_asks_for_one(page: Any, url: str, tmp_path: Path, complaints: list[str]) -> None:
+    """Both use the same model, which is no choice then, but the page cannot know."""
+    add = "directives:\n- add_model: {name: arm, file: arm.urdf}\n- add_weld: {parent: world, child: arm::base}\n"
+    scenes = {f"{name}___yaml": f"name: {name}\n{add}" for name in ("left", "right")}
+    upload(page, url, packed(tmp_path, arm___urdf=urdf("arm", "link.obj"), link___obj=TETRAHEDRON, **scenes))
+    page.get_by_label("mine.zip has several robots or scenes. Which one?").select_option("left.yaml")
+    page.get_by_text("left is stored, with 2 joints and 1 pair").wait_for()
+    complaints.clear()
+
+
+def test_a_robot_without_its_meshes_says_which_file_is_missing(page: Any, url: str, tmp_path: Path, complaints: list[str]) -> None:
+    (tmp_path / "arm.urdf").write_text(urdf("arm"))
+    upload(page, url, tmp_path / "arm.urdf")
+    page.get_by_text("arm.urdf takes a file from the package arm_description, and the zip has no meshes/link.obj").wait_for()
+    complaints.clear()
+
+
+def test_a_robot_in_xacro_says_who_expands_it(page: Any, url: str, tmp_path: Path, complaints: list[str]) -> None:
+    xacro = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="arm"><xacro:property name="x" value="1"/></robot>'
+    (tmp_path / "arm.urdf").write_text(xacro)
+    upload(page, url, tmp_path / "arm.urdf")
+    page.get_by_text("arm.urdf is written in xacro, which the service does not run (expand it, as").wait_for()
+    complaints.clear()
+
+
+def test_what_is_wrong_in_a_scene_file_says_where(page: Any, url: str, tmp_path: Path, complaints: list[str]) -> None:
+    upload(page, url, packed(tmp_path, scene___yaml="paddings: 1\ndirectives: []\n"))
+    page.get_by_text("mine.zip is no scene that can be used: paddings: is not a key of a scene file").wait_for()
+    complaints.clear()
+
+
+def test_the_page_of_a_scene_has_its_warnings_in_one_list(page: Any, url: str, client: TestClient, tmp_path: Path, barriers: Any) -> None:
+    endless = urdf("arm").replace('type="revolute"', 'type="continuous"')
+    path = packed(tmp_path, arm___urdf=endless, meshes__link___obj=TETRAHEDRON)
+    client.post("/v1/scenes", files={"bundle": ("arm.zip", path.read_bytes(), "application/zip")}).raise_for_status()
+    page.goto(f"{url}/scenes/arm")
+    listed = page.get_by_role("region", name="Read this before you trust a proof about the scene").get_by_role("listitem")
+    assert listed.count() == len(client.get("/v1/scenes/arm/lint").json()["warnings"]) >= 2
+    assert barriers(page) == []
+
+
+def test_a_small_region_is_not_said_to_be_nothing(page: Any, url: str, planar: Scene) -> None:
+    """One of many samples of the slice is in a region, and all but one are free."""
+
+    def answer(route: Any) -> None:
+        found = route.fetch().json()
+        free = "." * len(found["rows"][0])
+        route.fulfill(json={**found, "rows": ["o" + free[1:], *[free] * (len(found["rows"]) - 2), "#" * len(free)]})
+
+    page.route("**/v1/planning/slice", answer)
+    page.goto(f"{url}/scenes/planar")
+    page.get_by_text("less than 1 % of this slice is certified").first.wait_for()
+
+
+def test_a_proposal_tells_its_progress_beside_a_settled_iteration(
+    page: Any, url: str, running: str, scene: Scene, database: Database, barriers: Any
+) -> None:
+    """A box around the seed is certified first, while the proposal is looked for."""
+    iteration = {"index": 0, "label": "box", **SLIDE, "pairs": [], "reuse": {}, "hard": [], "failures": None}
+    with database.write() as session:
+        job = jobs.lock(session, running)
+        add_iteration(session, job, **iteration)
+        pairs.iterations(session, running)[-1].state = IterationState.CERTIFIED
+        steps.add(session, job, "propose", {})
+        assert steps.claim(session, job, accepts=False, lease_seconds=600) is not None
+        events.emit(session, job, events.NOTE, {"text": "proposing, 40 s, 31 faces"})
+    page.goto(f"{url}/jobs/{running}")
+    page.get_by_role("heading", name="Iteration 0: a box around the seed certified").wait_for()
+    page.get_by_text("Seeding: looking for a starting region around the seed (proposing, 40 s, 31 faces).").wait_for()
+    assert barriers(page) == []
+    with database.write() as session:
+        pairs.iterations(session, running)[-1].state = IterationState.RUNNING
+    page.reload()
+    page.get_by_role("heading", name="Iteration 0: a box around the seed running").wait_for()
+    assert page.get_by_text("Seeding: looking").count() == 0
