@@ -55,6 +55,14 @@ def twins(t: Trial) -> None:
     t.ask("GET", f"/v1/jobs/{first[:4]}")
 
 
+def at_provider(t: Trial, path: str) -> None:
+    """Signs in at a provider that is away."""
+    t.need("environment").setenv("CIRIS_OIDC_ISSUER", "http://127.0.0.1:9")
+    t.need("environment").setenv("CIRIS_OIDC_CLIENT_ID", "ciris")
+    settings.cache_clear()
+    t.ask("GET", f"/login/oidc{path}")
+
+
 def outside(t: Trial) -> None:
     """Asks for a path, straight in s, to where the slider cannot go."""
     t.need("scene")
@@ -222,6 +230,8 @@ SERVICE: Table = {
         lambda t: with_key(t, "GET", "/v1/jobs", key=""),
         lambda t: with_key(t, "GET", "/v1/jobs", key="wrong"),
     ],
+    ("provider_unavailable", "CIRIS_OIDC_ISSUER"): [lambda t: at_provider(t, "")],
+    ("sign_in_refused", "url"): [lambda t: at_provider(t, "/callback?code=x")],
     ("unknown_host", "Host"): [lambda t: t.ask("GET", "/healthz", headers={"Host": "evil.example"})],
     ("cross_site", "Origin"): [lambda t: t.ask("POST", "/v1/jobs/x/cancel", headers={"Origin": "https://evil.example"})],
     ("invalid_request", "url"): [lambda t: t.ask("GET", "/v1/scenes?after=%00")],
@@ -238,7 +248,7 @@ SERVICE: Table = {
         lambda t: t.ask("POST", "/v1/jobs", json=3),
         lambda t: t.ask("POST", "/v1/jobs", content='{"a": 1, "a": 2}', headers={"Content-Type": "application/json"}),
     ],
-    ("not_found", "url"): [lambda t: t.ask("GET", "/v1/nothing")],
+    ("not_found", "url"): [lambda t: t.ask("GET", "/v1/nothing"), lambda t: t.ask("GET", "/login/oidc")],
     ("method_not_allowed", "method"): [lambda t: t.ask("PUT", "/v1/jobs")],
     ("pair_not_found", "pair"): [lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/pairs/9/cells")],
     ("cells_not_found", "pair"): [lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/pairs/0/cells")],
