@@ -320,6 +320,14 @@ def test_the_audit_log_names_the_person(service: TestClient, provider: RealProvi
         assert audit.page(session).rows[0].who == "alice@example.org (OIDC, subject alice-1)"
 
 
+def test_a_person_may_make_the_first_key(service: TestClient, provider: RealProvider, database: Database) -> None:
+    grant(database, "welding", Kind.PERSON, "alice@example.org", Scope.ADMIN)
+    sign_in(service, provider)
+    assert 'id="make-key"' in service.get("/project").text
+    key = service.post("/v1/keys", json={"name": "planner", "scope": "read"}).json()["key"]
+    assert service.get("/v1/project", headers=bearer(key)).json()["name"] == "welding"
+
+
 def test_idempotency_keys_of_people_are_their_own(service: TestClient, provider: RealProvider, database: Database, scene: Scene) -> None:
     ids = []
     provider.knows("bob", email="bob@example.org", email_verified="true")
