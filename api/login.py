@@ -9,7 +9,7 @@ from __future__ import annotations
 import hmac
 import re
 from http import HTTPStatus
-from typing import Annotated
+from typing import Annotated, Any
 from urllib.parse import quote
 
 from fastapi import APIRouter, Depends, Form, Request, Response
@@ -184,7 +184,7 @@ def _keep(request: Request, response: Response, token: str) -> None:
     _set(request, response, COOKIE, token, samesite="strict")
 
 
-def _set(request: Request, response: Response, name: str, value: str, **options: object) -> None:
+def _set(request: Request, response: Response, name: str, value: str, **options: Any) -> None:
     response.set_cookie(name, value, httponly=True, secure=request.url.scheme == "https", **options)
 
 

@@ -14,6 +14,7 @@ import secrets
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from typing import Any
 
 from sqlalchemy import delete, or_, select, update
 from sqlalchemy.orm import Session
@@ -70,7 +71,9 @@ def begin(session: Session, who: Key | Person) -> str:
     mine = SessionRow.key_id == who.id if isinstance(who, Key) else SessionRow.subject == who.subject
     newest = select(SessionRow.digest).where(mine).order_by(SessionRow.created_at.desc(), SessionRow.digest)
     session.execute(delete(SessionRow).where(SessionRow.digest.in_(session.scalars(newest.offset(MOST_OF_ONE - 1)).all())))
-    named = {"key_id": who.id} if isinstance(who, Key) else {"subject": who.subject, "email": who.email, "groups": list(who.groups)}
+    named: dict[str, Any] = (
+        {"key_id": who.id} if isinstance(who, Key) else {"subject": who.subject, "email": who.email, "groups": list(who.groups)}
+    )
     token, digest = _new()
     session.add(SessionRow(digest=digest, expires_at=utcnow() + timedelta(hours=settings().session_hours), **named))
     return token
