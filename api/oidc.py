@@ -10,6 +10,7 @@ import asyncio
 import base64
 import hashlib
 import json
+import logging
 import secrets
 import time
 from dataclasses import dataclass
@@ -24,6 +25,8 @@ from joserfc.jwk import KeySet
 from certifier.errors import CirisError
 from db.grants import MOST_LETTERS, Person
 from db.settings import Settings, trustworthy
+
+log = logging.getLogger(__name__)
 
 ALGORITHMS = ("RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "ES384", "ES512", "Ed25519", "EdDSA")
 """Tokens may be signed so: with a key of which the provider shows the public part only."""
@@ -210,6 +213,7 @@ class Provider:
             try:
                 self._provided = await self._read(now)
             except ProviderUnavailable as error:
+                log.warning("%s", error.message)
                 self._failure = time.monotonic(), error
                 raise
             return self._provided

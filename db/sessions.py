@@ -132,7 +132,9 @@ def note_use(session: Session, ids: Collection[str], now: datetime) -> None:
 
 def forgettable(session: Session, now: datetime) -> Sequence[str]:
     """Returns the ids of some sessions that have expired."""
-    return session.scalars(select(SessionRow.digest).where(SessionRow.expires_at < now).limit(TOGETHER)).all()
+    return session.scalars(
+        select(SessionRow.digest).where(SessionRow.expires_at < now).order_by(SessionRow.expires_at).limit(TOGETHER)
+    ).all()
 
 
 def forget(session: Session, ids: Sequence[str]) -> None:
