@@ -49,9 +49,8 @@ class KeyNeeded(CirisError):
     """The caller has no key and no session, or one that is not valid."""
 
     def __init__(self, headers: Headers) -> None:
-        message = "this service needs an API key" if presented(headers) is None else "this is not a valid API key"
-        if "authorization" not in headers and presented(headers) is not None:
-            message = "this session has ended, or may do nothing here any more; sign in again"
+        wrong = "this is not a valid API key" if "authorization" in headers else "this session has ended, or works in no project; sign in"
+        message = "this service needs an API key" if presented(headers) is None else wrong
         super().__init__("key_needed", message, field="Authorization", hint="send `Authorization: Bearer KEY`; `ciris key add` makes one")
         self.headers = {"WWW-Authenticate": "Bearer"}
 

@@ -28,7 +28,7 @@ from db.types import utcnow
 
 MOST_OF_ONE = 20
 """A key or a person has this many sessions at most. A new one ends the oldest."""
-TOGETHER = 1000
+TOGETHER = 100
 """At most this many expired sessions are deleted in one transaction."""
 _TOKEN = re.compile(r"[\w-]{43}", re.ASCII)
 _DIGEST_LETTERS = 64

@@ -7,7 +7,7 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from api.access import KEYS_SECONDS
+from api.access import COOKIE, KEYS_SECONDS
 from certifier.pair.forecast import forecast
 from db import keys, projects, proofs, scenes, staging, workers
 from db.keys import Scope
@@ -53,6 +53,13 @@ def twins(t: Trial) -> None:
     t.need("monkeypatch").setattr("db.jobs.uuid4", lambda: first[:-1] + ("0" if first[-1] != "0" else "1"))
     queued(t)
     t.ask("GET", f"/v1/jobs/{first[:4]}")
+
+
+def signed_out(t: Trial) -> None:
+    """Asks with a session that nobody began."""
+    with t.need("database").write() as session:
+        keys.add(session, "other", Scope.READ)
+    t.ask("GET", "/v1/jobs", headers={"Cookie": f"{COOKIE}={43 * 'a'}"})
 
 
 def at_provider(t: Trial, path: str) -> None:
@@ -229,6 +236,7 @@ SERVICE: Table = {
     ("key_needed", "Authorization"): [
         lambda t: with_key(t, "GET", "/v1/jobs", key=""),
         lambda t: with_key(t, "GET", "/v1/jobs", key="wrong"),
+        signed_out,
     ],
     ("provider_unavailable", "CIRIS_OIDC_ISSUER"): [lambda t: at_provider(t, "")],
     ("sign_in_refused", "url"): [lambda t: at_provider(t, "/callback?code=x")],
