@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import logging
 import math
 import time
@@ -20,23 +21,24 @@ from starlette.datastructures import Headers
 from starlette.requests import cookie_parser
 
 from certifier.errors import CirisError
-from db import keys, version
+from db import keys, sessions, version
 from db.keys import Key, Scope
 from db.models import DEFAULT_PROJECT
 from db.session import UNAVAILABLE, Database
+from db.sessions import SignedIn
 from db.types import utcnow
 
 log = logging.getLogger(__name__)
 
-COOKIE = "ciris_key"
+COOKIE = "ciris_session"
 KEYS_SECONDS = 1.0
-"""A key that was read from the database is trusted for this many seconds."""
+"""A key or session that was read from the database is trusted for this many seconds."""
 PATIENCE_SECONDS = 0.3
 """A request of monitoring waits this many seconds for the keys."""
 AGAIN_SECONDS = 0.1
-"""When requests bring unknown keys, the database is read at most once in this many seconds, however many requests there are."""
+"""When requests bring unknown keys or sessions, the database is read at most once in this many seconds, however many requests there are."""
 MOST_KEYS = 10_000
-"""This many keys are remembered. The one that was not used for longest is looked up again when it comes."""
+"""This many keys and sessions are remembered. The one that was not used for longest is looked up again when it comes."""
 NOTES_SECONDS = 5.0
 """When it could not be noted that keys were used, this is tried again after this many seconds."""
 _thread = ThreadPoolExecutor(1, "keys")
@@ -47,12 +49,27 @@ _notes = ThreadPoolExecutor(1, "uses of keys")
 
 @dataclass(frozen=True)
 class Caller:
-    """A caller is the sender of a request. The caller has no key where the service asks for none."""
+    """A caller is the sender of a request: a key, or a person who signed in at the identity provider; neither where the service asks for
+    no key.
+
+    Attributes:
+        subject: the provider's name for the person, which never changes.
+        signed_in: whether the request came with a session.
+    """
 
     scope: Scope
     project: str = DEFAULT_PROJECT
     key_id: str | None = None
     name: str = "anybody"
+    subject: str | None = None
+    signed_in: bool = False
+
+    @property
+    def id(self) -> str | None:
+        """Returns by what the caller is counted and found in logs: the key's id, or the person's in this project; None for anybody."""
+        if self.subject is None:
+            return self.key_id
+        return f"person-{hashlib.sha256(f'{self.project} {self.subject}'.encode()).hexdigest()[:16]}"
 
     @property
     def runs_service(self) -> bool:
@@ -60,19 +77,22 @@ class Caller:
         return self.project == DEFAULT_PROJECT and self.scope.includes(Scope.ADMIN)
 
     def __str__(self) -> str:
+        if self.subject is not None:
+            return f"{self.name} (OIDC, subject {self.subject})"
         return self.name if self.key_id is None else f"{self.name} ({self.key_id})"
 
 
 @dataclass(frozen=True)
 class _Known:
-    """A key as the database had it at ``read_at``."""
+    """A key or session as the database had it at ``read_at``."""
 
-    key: Key
+    held: Key | SignedIn
     read_at: float
 
 
 class Keyring:
-    """A keyring recognises callers by their keys. It looks each key up by its id, whatever other keys there are.
+    """A keyring recognises callers by their keys and sessions. It looks each up by its id, whatever others there are. What is said of
+    keys here holds for sessions, too.
 
     It remembers the ``MOST_KEYS`` keys that were used last. About twice in ``KEYS_SECONDS`` it reads those that were used meanwhile
     again, all at once. So a revoked key is refused after ``KEYS_SECONDS`` at the latest, and a key that is in use never waits for a
@@ -93,11 +113,13 @@ class Keyring:
         self._read_at = -math.inf
         self._reading: asyncio.Future[None] | None = None
         self._used: set[str] = set()
-        """The ids of keys whose use is to be noted."""
+        """The ids of keys and sessions whose use is to be noted."""
         self._noting: asyncio.Future[None] | None = None
 
     async def caller(self, given: str | None, *, patient: bool = True) -> Caller | None:
-        """Returns the caller to whom the key of a request belongs; None when what is known now does not let this caller in.
+        """Returns the caller to whom the key or session of a request belongs; None when what is known now does not let this caller in.
+
+        Where the service asks for no key, nobody can have signed in. A session is then one of another service on this machine.
 
         Args:
             patient: False for a request that must be answered while the database hangs: what was read last counts then.
@@ -105,19 +127,19 @@ class Keyring:
         Raises:
             sqlalchemy.exc.SQLAlchemyError: the keys cannot be read.
         """
-        if given is None:
+        if given is None or (self._open and sessions.id_of(given) is not None):
             return Caller(Scope.ADMIN) if await self._is_open(patient) else None
-        id = keys.id_of(given)
-        key = None if id is None else await self._key(id, patient)
-        if key is None or not key.opens(given):
+        id = _id_of(given)
+        held = None if id is None else await self._held(id, patient)
+        if held is None or not held.opens(given):
             return None
-        if not key.used_lately():
-            self._note_soon(key.id)
-        return Caller(key.scope, key.project, key.id, key.name)
+        if not held.used_lately():
+            self._note_soon(held.id)
+        return _caller(held)
 
     async def newcomer(self, given: str | None) -> Caller | None:
         """Returns the caller of a key that :meth:`caller` does not know, because nobody has used it here; else None."""
-        id = None if given is None else keys.id_of(given)
+        id = None if given is None else _id_of(given)
         if id is None or id in self._known:
             return None
         asked = time.monotonic()
@@ -136,8 +158,8 @@ class Keyring:
             self._read_soon()
         return self._open
 
-    async def _key(self, id: str, patient: bool) -> Key | None:
-        """Returns the key of this id as it was ``KEYS_SECONDS`` ago or later; None where none is known."""
+    async def _held(self, id: str, patient: bool) -> Key | SignedIn | None:
+        """Returns the key or session of this id as it was ``KEYS_SECONDS`` ago or later; None where none is known."""
         while (known := self._known.get(id)) is not None and known.read_at < time.monotonic() - KEYS_SECONDS:
             if not await _done(self._read(id), patient):
                 break
@@ -146,7 +168,7 @@ class Keyring:
         self._wanted.add(id)
         if known.read_at < time.monotonic() - KEYS_SECONDS / 2:
             self._read_soon()
-        return known.key
+        return known.held
 
     async def _read(self, *ids: str, pause: float = 0.0) -> None:
         """Waits for the reading that is under way, or for the next one, which looks up these ids too.
@@ -171,19 +193,19 @@ class Keyring:
             found, self._open = await asyncio.get_running_loop().run_in_executor(_thread, self._look_up, ids)
             for id in ids - found.keys():
                 self._known.pop(id, None)
-            self._known.update({id: _Known(key, began) for id, key in found.items()})
+            self._known.update({id: _Known(held, began) for id, held in found.items()})
             self._read_at = began
         finally:
             self._reading = None
 
     def _note_soon(self, id: str) -> None:
-        """Has a key's use noted."""
+        """Has the use of a key or session noted."""
         self._used.add(id)
         if self._noting is None:
             self._noting = asyncio.ensure_future(self._note_uses())
 
     async def _note_uses(self) -> None:
-        """Notes which keys were used, until nothing is to be noted."""
+        """Notes which keys and sessions were used, until nothing is to be noted."""
         try:
             while self._used:
                 ids, self._used, now = self._used, set(), utcnow()
@@ -195,19 +217,36 @@ class Keyring:
                     continue
                 for id in ids & self._known.keys():
                     known = self._known[id]
-                    self._known[id] = replace(known, key=replace(known.key, last_used_at=now))
+                    self._known[id] = replace(known, held=replace(known.held, last_used_at=now))
         finally:
             self._noting = None
 
     def _note(self, ids: set[str], now: datetime) -> None:
         with self._database.write() as session:
             keys.note_use(session, ids, now)
+            sessions.note_use(session, ids, now)
 
-    def _look_up(self, ids: set[str]) -> tuple[dict[str, Key], bool]:
-        """Returns the keys that have these ids, by id, and whether the service is open."""
+    def _look_up(self, ids: set[str]) -> tuple[dict[str, Key | SignedIn], bool]:
+        """Returns the keys and sessions that have these ids, by id, and whether the service is open."""
         with self._database.read() as session:
             version.check(session)
-            return keys.find(session, ids), self._open and not keys.exist(session)
+            return {**keys.find(session, ids), **sessions.find(session, ids)}, self._open and not keys.exist(session)
+
+
+def _id_of(given: str) -> str | None:
+    """Returns the id of the key or session that came with a request; None where it has the form of neither."""
+    return keys.id_of(given) or sessions.id_of(given)
+
+
+def _caller(held: Key | SignedIn) -> Caller | None:
+    """Returns the caller whom a key or session lets in; None for a person who works in no project."""
+    key = held if isinstance(held, Key) else held.key
+    if key is not None:
+        return Caller(key.scope, key.project, key.id, key.name, signed_in=held is not key)
+    if not isinstance(held, SignedIn) or held.person is None or held.project is None:
+        return None
+    project, scope = held.project
+    return Caller(scope, project, None, held.person.name, held.person.subject, signed_in=True)
 
 
 async def _done(reading: Awaitable[None], patient: bool) -> bool:
@@ -221,12 +260,16 @@ async def _done(reading: Awaitable[None], patient: bool) -> bool:
     return True
 
 
-def presented_key(headers: Headers) -> str | None:
-    """Returns the key that came with a request: that of the Authorization header, or else that of the cookie."""
+def presented(headers: Headers) -> str | None:
+    """Returns what came with a request: the key of the Authorization header, or else the session of the cookie."""
     kind, _, value = headers.get("authorization", "").partition(" ")
-    if kind.lower() == "bearer":
-        return value.strip()
-    return cookie_parser(headers.get("cookie", "")).get(COOKIE)
+    return value.strip() if kind.lower() == "bearer" else session_of(headers)
+
+
+def session_of(headers: Headers) -> str | None:
+    """Returns the token of the cookie; None where there is none. What has another form, such as a key, counts as none."""
+    token = cookie_parser(headers.get("cookie", "")).get(COOKIE, "")
+    return token if sessions.id_of(token) is not None else None
 
 
 class _Needs(HTTPBearer):
@@ -247,8 +290,10 @@ class _Needs(HTTPBearer):
         """
         caller: Caller = request.state.caller
         if not caller.scope.includes(self._scope):
-            problem = f"this needs a key of the scope {self._scope}; the key {caller.name!r} has {caller.scope}"
-            raise CirisError("scope_missing", problem, field="Authorization", hint=f"`ciris key add NAME --scope {self._scope}` makes one")
+            who = f"the key {caller.name!r}" if caller.subject is None else f"{caller.name!r}"
+            makes = "key add NAME" if caller.subject is None else f"project grant {caller.project} --person {caller.name}"
+            problem = f"this needs a key of the scope {self._scope}; {who} has {caller.scope}"
+            raise CirisError("scope_missing", problem, field="Authorization", hint=f"`ciris {makes} --scope {self._scope}` makes one")
         return caller
 
 
@@ -272,7 +317,7 @@ def check_runs_service(caller: Caller) -> None:
         CirisError: other_projects.
     """
     if not caller.runs_service:
-        problem = f"the key {caller.name!r} belongs to the project {caller.project}, and this is about other projects or all of them"
+        problem = f"{caller.name!r} belongs to the project {caller.project}, and this is about other projects or all of them"
         raise CirisError(
             "other_projects", problem, field="Authorization", hint="ask those who run the service: admins of the project default"
         )

@@ -42,6 +42,6 @@ class AccessLog:
                 "status": status,
                 "seconds": round(seconds, 4),
                 "client": scope["client"][0] if scope.get("client") else None,
-                "key": caller and caller.key_id,
+                "key": caller and caller.id,
             }
             log.info("request", extra=fields)

@@ -23,6 +23,7 @@ from api.libraries import Libraries
 from api.links import LinksKept
 from api.metrics import Requests
 from api.motions import MotionsKept
+from api.oidc import provider_of
 from api.pages import site
 from api.pages.rendering import render_problem
 from api.parameters import KNOWN
@@ -94,7 +95,8 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.free_sets = FreeSetsKept()
     app.state.outlines = OutlinesKept()
     app.state.room = Room()
-    app.state.keyring = Keyring(app.state.database, open_without_keys=settings().loopback)
+    app.state.keyring = Keyring(app.state.database, open_without_keys=settings().loopback and not settings().oidc_issuer)
+    app.state.provider = provider_of(settings())
     app.state.announcer = Announcer()
     app.add_middleware(delivery.Unchanged)
     app.add_middleware(

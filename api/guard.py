@@ -19,7 +19,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from api.access import Keyring, presented_key
+from api.access import Keyring, presented
 from api.limits import Buckets
 from certifier.errors import CirisError
 from db.session import UNAVAILABLE
@@ -29,7 +29,9 @@ BODY_BYTES = 16 * 2**20
 UPLOAD_BYTES = 64 * 2**20
 UPLOADS = "/v1/scenes"
 HEALTH = frozenset({"/healthz", "/readyz"})
-PUBLIC = HEALTH | {"/login", "/logout"}
+PUBLIC = HEALTH | {"/login", "/login/oidc", "/login/oidc/callback", "/login/project", "/logout"}
+SAME_SITE = frozenset({"same-origin", "none"})
+"""A browser says so of requests that come from the service's own pages, or from the person: by a bookmark or the address line."""
 STATIC = "/static/"
 WATCHED = frozenset({"/metrics"})
 """Monitoring asks for these. They are answered while the database hangs."""
@@ -44,10 +46,11 @@ class TooManyRequests(CirisError):
 
 
 class KeyNeeded(CirisError):
-    """The caller has no key, or one that is not valid."""
+    """The caller has no key and no session, or one that is not valid."""
 
-    def __init__(self, given: str | None) -> None:
-        message = "this service needs an API key" if given is None else "this is not a valid API key"
+    def __init__(self, headers: Headers) -> None:
+        wrong = "this is not a valid API key" if "authorization" in headers else "this session has ended, or works in no project; sign in"
+        message = "this service needs an API key" if presented(headers) is None else wrong
         super().__init__("key_needed", message, field="Authorization", hint="send `Authorization: Bearer KEY`; `ciris key add` makes one")
         self.headers = {"WWW-Authenticate": "Bearer"}
 
@@ -57,7 +60,7 @@ class Guard:
 
     Args:
         hosts: names under which the service may be called; None for any.
-        rate: requests a second that one key, or one address without a key, may make for long.
+        rate: requests a second that one key or person, or one address without a key, may make for long.
         respond: makes the response for an error.
     """
 
@@ -89,30 +92,34 @@ class Guard:
         if self._hosts is not None and _name(host) not in self._hosts:
             raise CirisError("unknown_host", f"this service is not {host!r}", field="Host", hint="call it by 127.0.0.1 or localhost")
         origin = headers.get("origin")
-        if method not in ("GET", "HEAD", "OPTIONS") and origin is not None and origin.partition("://")[2] != host:
+        if method in ("GET", "HEAD", "OPTIONS"):
+            return
+        foreign = origin is not None and origin.partition("://")[2] != host
+        if foreign or headers.get("sec-fetch-site", "none") not in SAME_SITE:
             hint = "send them from the service's own pages, or from a program"
-            raise CirisError("cross_site", f"requests from {origin} are not accepted", field="Origin", hint=hint)
+            raise CirisError("cross_site", f"requests from {origin or 'another site'} are not accepted", field="Origin", hint=hint)
 
     async def _check_caller(self, scope: Scope, headers: Headers) -> None:
         """Finds out who asks (``request.state.caller``), except on public paths, and counts the request.
 
-        A caller with a valid key is counted by the key, wherever the caller is. So others behind the same address cannot use up the
-        caller's requests. Everybody else is counted by address, before the guard does anything else for them; so is the first request
+        A caller with a valid key, or who has signed in, is counted by the key or the person, wherever the caller is. So others behind the
+        same address cannot use up the caller's requests. Everybody else is counted by address, before the guard does anything else for
+        them; so is the first request
         of a key in this process. Health checks are not counted: who shares an address with them must not have the service ended.
         """
         if scope["path"] in HEALTH:
             return
         public = scope["path"] in PUBLIC or scope["path"].startswith(STATIC)
-        given = None if public else presented_key(headers)
+        given = None if public else presented(headers)
         caller = None if public else await self._keyring.caller(given, patient=scope["path"] not in WATCHED)
-        key_id = caller and caller.key_id
-        wait = self._keys.take(key_id) if key_id else self._addresses.take(_network(scope))
+        id = caller and caller.id
+        wait = self._keys.take(id) if id else self._addresses.take(_network(scope))
         if wait > 0:
             raise TooManyRequests(wait)
         if caller is None and not public:
             caller = await self._keyring.newcomer(given)
             if caller is None:
-                raise KeyNeeded(given)
+                raise KeyNeeded(headers)
         scope.setdefault("state", {})["caller"] = caller
 
 

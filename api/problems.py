@@ -55,6 +55,8 @@ _STATUS_OF_CODE = {
     "bundle_too_large": HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
     **dict.fromkeys(("child_timeout", "child_memory", "child_died"), HTTPStatus.SERVICE_UNAVAILABLE),
     "cross_site": HTTPStatus.FORBIDDEN,
+    "sign_in_refused": HTTPStatus.FORBIDDEN,
+    "provider_unavailable": HTTPStatus.SERVICE_UNAVAILABLE,
     "unknown_host": HTTPStatus.MISDIRECTED_REQUEST,
     "key_needed": HTTPStatus.UNAUTHORIZED,
     "scope_missing": HTTPStatus.FORBIDDEN,

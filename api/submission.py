@@ -98,7 +98,7 @@ def _submit(session: Session, asked: Checked, caller: Caller, stored_key: str | 
 
 def _name(caller: Caller) -> str:
     """Returns whose idempotency keys are meant."""
-    return caller.key_id or "open"
+    return caller.id or "open"
 
 
 def _digest(asked: Checked) -> str:

@@ -1,4 +1,4 @@
-"""The audit log says who changed keys and limits, promoted scenes, deleted what, and paused or drained workers.
+"""The audit log says who changed keys, grants and limits, promoted scenes, deleted what, and paused or drained workers.
 
 It is written with the change, in the same transaction.
 """
@@ -32,6 +32,8 @@ class Action(StrEnum):
     LIMITS_SET = "limits_set"
     KEY_MADE = "key_made"
     KEY_REVOKED = "key_revoked"
+    GRANT_MADE = "grant_made"
+    GRANT_REVOKED = "grant_revoked"
     SCENE_PROMOTED = "scene_promoted"
     SCENE_DELETED = "scene_deleted"
     JOB_DELETED = "job_deleted"

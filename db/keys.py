@@ -134,7 +134,11 @@ class Key:
 
     def opens(self, given: str) -> bool:
         """Says whether what a caller sent is this key, and may be used."""
-        return (self.revoked_at is None or utcnow() < self.revoked_at) and hmac.compare_digest(self.digest, _digest(given))
+        return self.lasts(utcnow()) and hmac.compare_digest(self.digest, _digest(given))
+
+    def lasts(self, now: datetime) -> bool:
+        """Says whether the key is neither revoked nor expired."""
+        return self.revoked_at is None or now < self.revoked_at
 
     def used_lately(self) -> bool:
         """Says whether its use need not be noted again yet."""
@@ -186,12 +190,12 @@ def forget(session: Session, ids: Sequence[str]) -> None:
 
 
 def check_bind(settings: Settings) -> None:
-    """Refuses to serve an address that others can reach while no key was ever made.
+    """Refuses to serve an address that others can reach while no key was ever made and no identity provider is set.
 
     Raises:
         CirisError: no_keys, or no_database when the database cannot tell.
     """
-    if settings.loopback:
+    if settings.loopback or settings.oidc_issuer:
         return
     database = Database(settings.database)
     try:

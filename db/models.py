@@ -30,6 +30,7 @@ class Base(DeclarativeBase):
         datetime: Utc,
         Document: JSON(none_as_null=True),
         list[int]: JSON(none_as_null=True),
+        list[str]: JSON(none_as_null=True),
         Arrays: Npz,
         bytes: LargeBinary,
         str: Text,
@@ -145,6 +146,45 @@ class ApiKeyRow(Owned, Base):
     """A little before its last use (db.keys.NOTED)."""
 
 
+class GrantRow(Owned, Base):
+    """A grant lets a person, or a group of people, whom the identity provider names into a project."""
+
+    __tablename__ = "grants"
+    __table_args__ = (UniqueConstraint("kind", "name", "project"),)
+
+    id: Mapped[str] = mapped_column(String(36), primary_key=True)
+    kind: Mapped[str] = mapped_column(String(16))
+    """A value of db.grants.Kind."""
+    name: Mapped[str]
+    """The person's e-mail address in small letters or subject, or the group, as the provider says it."""
+    scope: Mapped[str] = mapped_column(String(16))
+    """A value of db.keys.Scope."""
+    created_at: Mapped[datetime] = mapped_column(default=utcnow)
+
+
+class SessionRow(Base):
+    """A session lasts from signing in to signing out. It is a key's, or a person's, who may then have chosen a project by a grant."""
+
+    __tablename__ = "sessions"
+    __table_args__ = (Index(None, "key_id", "created_at"), Index(None, "subject", "created_at"), Index(None, "expires_at"))
+
+    digest: Mapped[str] = mapped_column(String(64), primary_key=True)
+    """SHA-256 of the token that the browser has."""
+    key_id: Mapped[str | None] = mapped_column(ForeignKey("api_keys.id", ondelete="CASCADE"))
+    subject: Mapped[str | None]
+    """The person's name for programs, as the identity provider says it; None in a session of a key."""
+    email: Mapped[str | None]
+    """The person's e-mail address in small letters, if the provider has verified it."""
+    groups: Mapped[list[str]] = mapped_column(default=list)
+    """The person's groups when the person signed in."""
+    grant_id: Mapped[str | None] = mapped_column(ForeignKey("grants.id", ondelete="SET NULL"), index=True)
+    """The grant by which the person works in a project; None before one is chosen, and once it is withdrawn."""
+    created_at: Mapped[datetime] = mapped_column(default=utcnow)
+    expires_at: Mapped[datetime]
+    last_used_at: Mapped[datetime | None]
+    """A little before its last use (db.keys.NOTED)."""
+
+
 class AuditRow(Owned, Base):
     """This row says who changed what a project's people rely on: a key, a limit, what a name means, something that was deleted.
 
@@ -156,7 +196,7 @@ class AuditRow(Owned, Base):
 
     id: Mapped[str] = mapped_column(String(36), primary_key=True)
     who: Mapped[str]
-    """The name of the key that was used, and its id; ``command line``; or ``anybody`` where the service asks for no key."""
+    """The name and id of the key that was used, or of the person who signed in; ``command line``; ``anybody`` where no key is asked for."""
     action: Mapped[str] = mapped_column(String(32))
     """A value of db.audit.Action."""
     what: Mapped[str]

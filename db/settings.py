@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated
 from urllib.parse import urlsplit
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, ValidationInfo
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError
@@ -91,6 +91,27 @@ def sqlite_url(path: Path) -> str:
 LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 
 
+def trustworthy(url: str) -> bool:
+    """Says whether what comes from a URL can be believed: over TLS, or on this machine."""
+    try:
+        parts = urlsplit(url)
+    except ValueError:
+        return False
+    return bool(parts.hostname) and (parts.scheme == "https" or (parts.scheme == "http" and parts.hostname in LOOPBACK_NAMES))
+
+
+def _issuer(given: str) -> str:
+    if given and (not trustworthy(given) or "?" in given or "#" in given):
+        raise ValueError(f"{given!r} is no issuer; write https://host or https://host/path as the provider writes it")
+    return given
+
+
+def _with_issuer(given: str, info: ValidationInfo) -> str:
+    if info.data.get("oidc_issuer") and not given:
+        raise ValueError("is not set, and CIRIS_OIDC_ISSUER is; give the name that the provider knows this service by")
+    return given
+
+
 DATABASE_FIELD = "CIRIS_DATABASE_URL"
 """Errors about the database name this setting."""
 
@@ -155,6 +176,17 @@ class Settings(BaseSettings):
     """One API key may have this many unfinished jobs. Where the service asks for no key, all callers share the limit."""
     max_keys_per_project: int = Field(default=500, ge=1)
     """One project may have this many API keys. Those that were revoked within the last day count."""
+
+    session_hours: float = Field(default=12.0, gt=0, le=24 * 90)
+    """Whoever has signed in on the pages has to sign in again after this many hours."""
+    oidc_issuer: Annotated[str, AfterValidator(_issuer)] = ""
+    """URL of the OpenID Connect provider where people sign in, as its tokens name it; empty: people sign in with API keys only."""
+    oidc_client_id: Annotated[str, AfterValidator(_with_issuer)] = Field(default="", validate_default=True)
+    """The provider knows this service by this name."""
+    oidc_client_secret: str = Field(default="", repr=False)
+    """The secret that the provider made for it; empty where it made none, as for public clients."""
+    oidc_groups_claim: str = "groups"
+    """The provider lists a person's groups under this name."""
 
     kept_motions: int = Field(default=500, ge=0)
     """Number of proved motions of a scene that are kept to answer later questions. The oldest ones go."""

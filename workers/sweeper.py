@@ -15,7 +15,7 @@ from kombu.exceptions import OperationalError
 from sqlalchemy.exc import DBAPIError, TimeoutError
 from sqlalchemy.orm import Session
 
-from db import audit, clock, events, jobs, keys, leases, pairs, projects, retention, work, workers
+from db import audit, clock, events, jobs, keys, leases, pairs, projects, retention, sessions, work, workers
 from db.models import JobRow, PairRow, StepRow
 from db.session import database
 from db.settings import settings
@@ -57,6 +57,7 @@ def do_round(holders: Holders, troubles: Troubles) -> None:
     chores = {
         "forgetting workers": forget_gone,
         "forgetting keys": forget_keys,
+        "forgetting sessions": forget_sessions,
         "forgetting what was done long ago": forget_audit,
         "expiry": expire,
         "giving room back": shrink,
@@ -125,6 +126,15 @@ def forget_keys() -> None:
     if ids:
         with database().write() as session:
             keys.forget(session, ids)
+
+
+def forget_sessions() -> None:
+    """Deletes some of the sessions that have expired."""
+    with database().read() as session:
+        ids = sessions.forgettable(session, utcnow())
+    if ids:
+        with database().write() as session:
+            sessions.forget(session, ids)
 
 
 def forget_audit() -> None:

@@ -10,7 +10,7 @@ from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
-from api.access import READ, Db, presented_key
+from api.access import READ, Db, presented
 from api.reading import ReadingRoute
 from api.schemas.common import MAX_INT, JobGiven, Listed
 from api.schemas.jobs import Event, EventList, ProjectEvent, ProjectEventList
@@ -67,7 +67,7 @@ async def stream_job_events(
     that event when the caller's key is revoked.
     """
     seq = min(after if last_event_id is None else last_event_id, job.event_seq)
-    keyring, given = request.app.state.keyring, presented_key(request.headers)
+    keyring, given = request.app.state.keyring, presented(request.headers)
     while await keyring.caller(given) is not None:
         page, ended = await run_in_threadpool(_next_page, db, job.id, seq)
         for event in page:
@@ -120,7 +120,7 @@ async def stream_project_events(
     last = await run_in_threadpool(_last_id, db)
     newest = last if begin is None else min(begin, last)
     seen: set[int] = set() if begin is not None else set(range(max(newest - LATE, 0), newest + 1))
-    keyring, given = request.app.state.keyring, presented_key(request.headers)
+    keyring, given = request.app.state.keyring, presented(request.headers)
     while await keyring.caller(given) is not None:
         page = await run_in_threadpool(_of_all, db, max(newest - LATE, 0), seen)
         for event in page:

@@ -77,7 +77,7 @@ _NOTED = {
 
 def _ask(db: Database, caller: Caller, worker_id: str, state: WorkerState) -> Worker:
     if not caller.runs_service:
-        problem = f"workers serve all projects; the key {caller.name!r} belongs to the project {caller.project}"
+        problem = f"workers serve all projects; {caller.name!r} belongs to the project {caller.project}"
         raise CirisError(
             "workers_shared", problem, field="Authorization", hint="ask those who run the service: admins of the project default"
         )

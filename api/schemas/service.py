@@ -85,7 +85,9 @@ class AuditLine(BaseModel):
     """Says who changed a key or a limit, or deleted something."""
 
     at: datetime = Field(description="When it was done.")
-    who: str = Field(description="The key's name and id; `command line`; or `anybody` where the service asks for no key.")
+    who: str = Field(
+        description="The key's name and id; the person who signed in; `command line`; or `anybody` where the service asks for no key."
+    )
     action: Action = Field(description="What was done.")
     what: str = Field(description="Names what was changed.")
 

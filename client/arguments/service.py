@@ -20,6 +20,11 @@ def _limit(text: str) -> float:
     return number
 
 
+def _whom(args: argparse.Namespace) -> list[str]:
+    """Returns the words that say whom a grant names."""
+    return [f"--group={args.group}" if args.person is None else f"--person={args.person}"]
+
+
 def add(verbs: Any) -> None:
     """Adds the commands."""
     up = verbs.add_parser("up", help="run the service on this machine until Ctrl-C")
@@ -56,6 +61,23 @@ def add(verbs: Any) -> None:
         help="refuse new jobs in a calendar month (UTC) in which solvers have worked S seconds for the project; 0: no limit",
     )
     limits.set_defaults(run="client.project:set_limits")
+    whom = Parser(add_help=False)
+    whom.add_argument("name", metavar="NAME", help="the project's name")
+    either = whom.add_mutually_exclusive_group(required=True)
+    either.add_argument("--person", metavar="PERSON", help="a person, by the verified e-mail address, or by the provider's `sub`")
+    either.add_argument("--group", metavar="GROUP", help="a group, as the identity provider names it")
+    granted = project.add_parser("grant", parents=[whom, database], help="let people of the identity provider into a project")
+    granted.add_argument(
+        "--scope", choices=["read", "submit", "admin"], required=True, help="what they may do; each scope includes those before it"
+    )
+    granted.set_defaults(words=lambda args: ["grant", args.name, *_whom(args), f"--scope={args.scope}"])
+    withdrawn = project.add_parser("revoke-grant", parents=[whom, database], help="withdraw a grant; it ends within a second")
+    withdrawn.set_defaults(words=lambda args: ["revoke-grant", args.name, *_whom(args)])
+    grants = project.add_parser("grants", parents=[database, as_json()], help="list who of the identity provider's people may do what")
+    grants.add_argument("name", metavar="NAME", nargs="?", help="only those of this project")
+    grants.set_defaults(words=lambda args: ["grants", *([] if args.name is None else [args.name]), *(["--json"] if args.json else [])])
+    for verb in (granted, withdrawn, grants):
+        verb.set_defaults(run="client.commands:in_database", module="db.grants")
     mine = project.add_parser(
         "show", parents=[remote(), as_json()], help="show a project of a service: its limits, and what remains of them"
     )

@@ -72,9 +72,9 @@ def client(database: Database, queue: Queue, environment: pytest.MonkeyPatch) ->
         yield client
 
 
-@pytest.fixture
-def url(database: Database, client: TestClient) -> Iterator[str]:
-    """A real server on the database of the client."""
+@contextmanager
+def served(database: Database) -> Iterator[str]:
+    """The URL of a real server on the database, with the settings that are set now."""
     server = uvicorn.Server(uvicorn.Config(create_app(database), port=0, log_level="warning", timeout_graceful_shutdown=1))
     thread = threading.Thread(target=server.run)
     thread.start()
@@ -83,6 +83,13 @@ def url(database: Database, client: TestClient) -> Iterator[str]:
     yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
     server.should_exit = True
     thread.join()
+
+
+@pytest.fixture
+def url(database: Database, client: TestClient) -> Iterator[str]:
+    """A real server on the database of the client."""
+    with served(database) as url:
+        yield url
 
 
 @contextmanager

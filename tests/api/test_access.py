@@ -171,7 +171,7 @@ def test_signing_in_and_out(client: TestClient, database: Database) -> None:
     assert "samesite=strict" in cookie
     assert client.get("/", headers=html).status_code == 200
     assert client.get("/v1/jobs").status_code == 200
-    assert "Sign out read" in client.get("/").text
+    assert ">read · default · read</span>" in client.get("/").text
 
     client.post("/logout")
     assert client.get("/v1/jobs").status_code == 401
@@ -234,12 +234,12 @@ def test_guessing_keys_is_slow(hasty: TestClient, database: Database) -> None:
 
 
 @contextmanager
-def readings(database: Database) -> Iterator[list[str]]:
-    """Grows by one with every reading of the keys."""
+def readings(database: Database, of: str = "api_keys") -> Iterator[list[str]]:
+    """Grows by one with every reading of the keys, or of something else."""
     seen: list[str] = []
 
     def look(_connection: object, _cursor: object, statement: str, *_: object) -> None:
-        if "api_keys" in statement:
+        if of in statement:
             seen.append(statement)
 
     event.listen(database.reader, "before_cursor_execute", look)

@@ -148,5 +148,6 @@ def test_signing_in_leads_to_the_page_that_was_asked_for_and_follows_the_job(
     page.get_by_text("pairs settled").first.wait_for()
     assert key not in page.content()
     assert page.evaluate("document.cookie") == ""
-    page.get_by_role("button", name="Sign out reader").click()
+    page.get_by_text("reader · default · read").wait_for()
+    page.get_by_role("button", name="Sign out").click()
     page.wait_for_url(f"{url}/login")

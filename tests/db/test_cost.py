@@ -1,19 +1,22 @@
-"""What claiming and saving a pair costs, however many pairs the iteration has; and letting a caller in, however many keys there are."""
+"""What claiming and saving a pair costs, however many pairs the iteration has; and letting a caller in, however many keys and
+sessions there are."""
 
 from __future__ import annotations
 
 import secrets
 import sqlite3
 from collections.abc import Callable
+from datetime import timedelta
 from typing import Any
 
 import pytest
 from sqlalchemy import insert, text
 from sqlalchemy.orm import Session
 
-from db import jobs, keys, leases, pairs, projects, work
+from db import grants, jobs, keys, leases, pairs, projects, sessions, work
+from db.grants import Kind, Person
 from db.keys import Scope
-from db.models import DEFAULT_PROJECT, ApiKeyRow, PairRow
+from db.models import DEFAULT_PROJECT, ApiKeyRow, GrantRow, PairRow, SessionRow
 from db.session import Database
 from db.states import JobState
 from db.types import utcnow
@@ -111,3 +114,39 @@ def test_the_effort_for_a_key_does_not_grow_with_the_number_of_keys_of_another_p
             session.execute(insert(ApiKeyRow), rows)
     many = efforts_of_keys(db, key)
     assert {call: many[call] for call in many if many[call] > few[call] + 5} == {}, few
+
+
+def efforts_of_sessions(db: Database, token: str, person: Person) -> dict[str, int]:
+    calls: dict[str, Callable[[Session], Any]] = {
+        "let a person in": lambda session: sessions.get(session, token),
+        "begin a session": lambda session: sessions.begin(session, person),
+        "forget sessions": lambda session: sessions.forgettable(session, utcnow()),
+        "choose a project": lambda session: grants.of_person(session, person),
+    }
+    found = {}
+    for name, call in calls.items():
+        with db.write() as session:
+            call(session)  # SQLite reads the tables' definitions first
+        found[name] = sum(effort(db, call, table)[1] for table in ("sessions", "grants"))
+    return found
+
+
+def test_the_effort_for_a_session_does_not_grow_with_the_number_of_sessions_and_grants(db: Database) -> None:
+    person = Person("alice-1", "alice@example.org", ("robotics", "welders"))
+    with db.write() as session:
+        grants.add(session, DEFAULT_PROJECT, Kind.GROUP, "robotics", Scope.READ)
+        token = sessions.choose(session, sessions.begin(session, person), DEFAULT_PROJECT)
+        assert token is not None
+    few = efforts_of_sessions(db, token, person)
+    now = utcnow()
+    of_others = {"email": None, "groups": [], "created_at": now, "expires_at": now + timedelta(hours=1)}
+    with db.write() as session:
+        rows = [{"digest": f"{i:064d}", "subject": f"bob-{i}", **of_others} for i in range(5000)]
+        session.execute(insert(SessionRow), rows)
+        granted = [
+            {"id": str(i), "project": DEFAULT_PROJECT, "kind": Kind.GROUP, "name": f"g{i}", "scope": "read", "created_at": now}
+            for i in range(5000)
+        ]
+        session.execute(insert(GrantRow), granted)
+    many = efforts_of_sessions(db, token, person)
+    assert {call: many[call] for call in many if many[call] > few[call] + 10} == {}, few

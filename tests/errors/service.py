@@ -7,7 +7,7 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from api.access import KEYS_SECONDS
+from api.access import COOKIE, KEYS_SECONDS
 from certifier.pair.forecast import forecast
 from db import keys, projects, proofs, scenes, staging, workers
 from db.keys import Scope
@@ -53,6 +53,21 @@ def twins(t: Trial) -> None:
     t.need("monkeypatch").setattr("db.jobs.uuid4", lambda: first[:-1] + ("0" if first[-1] != "0" else "1"))
     queued(t)
     t.ask("GET", f"/v1/jobs/{first[:4]}")
+
+
+def signed_out(t: Trial) -> None:
+    """Asks with a session that nobody began."""
+    with t.need("database").write() as session:
+        keys.add(session, "other", Scope.READ)
+    t.ask("GET", "/v1/jobs", headers={"Cookie": f"{COOKIE}={43 * 'a'}"})
+
+
+def at_provider(t: Trial, path: str) -> None:
+    """Signs in at a provider that is away."""
+    t.need("environment").setenv("CIRIS_OIDC_ISSUER", "http://127.0.0.1:9")
+    t.need("environment").setenv("CIRIS_OIDC_CLIENT_ID", "ciris")
+    settings.cache_clear()
+    t.ask("GET", f"/login/oidc{path}")
 
 
 def outside(t: Trial) -> None:
@@ -221,7 +236,10 @@ SERVICE: Table = {
     ("key_needed", "Authorization"): [
         lambda t: with_key(t, "GET", "/v1/jobs", key=""),
         lambda t: with_key(t, "GET", "/v1/jobs", key="wrong"),
+        signed_out,
     ],
+    ("provider_unavailable", "CIRIS_OIDC_ISSUER"): [lambda t: at_provider(t, "")],
+    ("sign_in_refused", "url"): [lambda t: at_provider(t, "/callback?code=x")],
     ("unknown_host", "Host"): [lambda t: t.ask("GET", "/healthz", headers={"Host": "evil.example"})],
     ("cross_site", "Origin"): [lambda t: t.ask("POST", "/v1/jobs/x/cancel", headers={"Origin": "https://evil.example"})],
     ("invalid_request", "url"): [lambda t: t.ask("GET", "/v1/scenes?after=%00")],
@@ -238,7 +256,7 @@ SERVICE: Table = {
         lambda t: t.ask("POST", "/v1/jobs", json=3),
         lambda t: t.ask("POST", "/v1/jobs", content='{"a": 1, "a": 2}', headers={"Content-Type": "application/json"}),
     ],
-    ("not_found", "url"): [lambda t: t.ask("GET", "/v1/nothing")],
+    ("not_found", "url"): [lambda t: t.ask("GET", "/v1/nothing"), lambda t: t.ask("GET", "/login/oidc")],
     ("method_not_allowed", "method"): [lambda t: t.ask("PUT", "/v1/jobs")],
     ("pair_not_found", "pair"): [lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/pairs/9/cells")],
     ("cells_not_found", "pair"): [lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/pairs/0/cells")],

@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 from sqlalchemy import update
 
-from db import command_line, jobs, keys, migrate, projects, retention, solver_time
+from db import command_line, grants, jobs, keys, migrate, projects, retention, solver_time
 from db.disk import Disk
+from db.grants import Kind
 from db.keys import Scope
 from db.models import JobRow
 from db.session import Database
@@ -113,6 +114,9 @@ def one_key_too_many(t: Trial) -> None:
 TEAMS: Table = {
     ("project_name", "name"): [lambda t: write(t, lambda session: projects.add(session, "a b")), lambda t: write(t, named_twice)],
     ("project_not_found", "project"): [lambda t: write(t, lambda session: keys.add(session, "planner", Scope.READ, "nobody"))],
+    ("grant_not_found", "--person"): [lambda t: write(t, lambda session: grants.revoke(session, "default", Kind.PERSON, "nobody"))],
+    ("setting", "CIRIS_OIDC_CLIENT_ID"): [lambda t: with_settings(t, CIRIS_OIDC_ISSUER="https://login.example.org")],
+    ("setting", "CIRIS_OIDC_ISSUER"): [lambda t: with_settings(t, CIRIS_OIDC_ISSUER="login.example.org")],
     ("no_database", "database"): [lambda t: command_line.check_there(f"sqlite:///{t.directory}/misspelt.sqlite3")],
     ("scene_not_found", "scene"): [
         lambda t: write(t, lambda session: jobs.create(session, kind="grow", scene_id="0" * 64, options={})),

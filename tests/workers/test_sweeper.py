@@ -81,7 +81,7 @@ def lose_a_lease(job_id: str) -> None:
         session.execute(update(PairRow).values(worker=ELSEWHERE, lease_until=utcnow() - timedelta(seconds=1)))
 
 
-@pytest.mark.parametrize("chore", ["forget_gone", "forget_keys", "forget_audit", "expire", "shrink"])
+@pytest.mark.parametrize("chore", ["forget_gone", "forget_keys", "forget_sessions", "forget_audit", "expire", "shrink"])
 def test_tidying_up_that_fails_keeps_nothing_from_being_taken_back(job_id: str, monkeypatch: pytest.MonkeyPatch, chore: str) -> None:
     done = []
 
@@ -89,7 +89,7 @@ def test_tidying_up_that_fails_keeps_nothing_from_being_taken_back(job_id: str, 
         done.append(chore)
         raise OverflowError
 
-    for name in ("forget_gone", "forget_keys", "forget_audit", "expire", "shrink"):
+    for name in ("forget_gone", "forget_keys", "forget_sessions", "forget_audit", "expire", "shrink"):
         monkeypatch.setattr(sweeper, name, fails if name == chore else partial(done.append, name))
     holders, troubles, now = sweeper.Holders(), Troubles(), utcnow()
     lose_a_lease(job_id)
@@ -98,7 +98,7 @@ def test_tidying_up_that_fails_keeps_nothing_from_being_taken_back(job_id: str, 
         monkeypatch.setattr(sweeper, "utcnow", partial(add, now, timedelta(seconds=seconds)))
         sweeper.do_round(holders, troubles)
     assert {row.state for row in pairs_of(job_id)} == {"open"}
-    assert sorted(done) == sorted(["forget_gone", "forget_keys", "forget_audit", "expire", "shrink"] * 4)
+    assert sorted(done) == sorted(["forget_gone", "forget_keys", "forget_sessions", "forget_audit", "expire", "shrink"] * 4)
     assert (troubles.said() or "").endswith("failed: OverflowError")
     monkeypatch.setattr(sweeper, chore, list)
     sweeper.do_round(holders, troubles)
