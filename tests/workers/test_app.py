@@ -33,7 +33,7 @@ worker_process_init.connect(start, weak=False)
 sys.argv = ["workers", "solve"]
 main()
 """
-"""A worker. All of its processes but the first need longer to start than the four seconds that Celery gives them by default."""
+"""A worker. All of its processes but the first two need longer to start than the four seconds that Celery gives them by default."""
 
 
 @pytest.mark.slow
