@@ -3,7 +3,7 @@
 A message to the solvers only says that there is work. Which work it is, this module decides when a solver is free. It goes to the
 project whose work the fewest solvers do now, however many keys and jobs the project has; within it to the key of which the same is
 true; within the key to the job that was served least. So a newcomer gets the next solver that is free, however long pieces of others
-take. Projects and keys of which as many solvers work take turns.
+take. Projects and keys of which as many solvers work take turns. While no solver is free, a process beside them does pieces of new jobs.
 
 ``jobs.served`` counts the seconds that a job was given, divided by its share. The job with the least goes next (stride scheduling:
 Waldspurger, Weihl 1995). Each step of priority doubles a job's share of its key's work.
