@@ -29,7 +29,7 @@ from db.types import Utc, utcnow
 
 MOST_KEYS = 100_000
 """The jobs of at most this many keys are compared when the next one is chosen."""
-NEW_SECONDS = 20.0
+NEW_SECONDS = 60.0
 """A job counts as new for this long after a solver has first begun a piece of it."""
 ROUNDING = 1e-9
 """Sums of fractions of batches may be too large by so much."""
@@ -231,7 +231,7 @@ def _has_region_now() -> Select[str]:
 
 
 def _is_new() -> ColumnElement[bool]:
-    return and_(JobRow.state == JobState.RUNNING, or_(JobRow.claimed_at.is_(None), JobRow.claimed_at > bindparam("since", type_=Utc())))
+    return or_(JobRow.claimed_at.is_(None), JobRow.claimed_at > bindparam("since", type_=Utc()))
 
 
 def _has_solver() -> ColumnElement[bool]:

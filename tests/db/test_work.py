@@ -245,6 +245,16 @@ def test_a_new_job_is_one_that_nobody_works_for_and_that_was_begun_a_moment_ago(
     assert newcomer(db) is None
 
 
+def test_a_new_job_that_is_cancelled_need_not_wait_for_its_region_to_be_accepted(db: Database) -> None:
+    job_id = a_job_of(db, pair_count=0)
+    with db.write() as session:
+        job = jobs.lock(session, job_id)
+        steps.add(session, job, "accept", {})
+        jobs.claimed(job)
+        jobs.cancel(session, job_id)
+    assert newcomer(db) == job_id
+
+
 def test_a_step_that_was_begun_before_is_left_to_the_solvers(db: Database) -> None:
     job_id = a_job_of(db, pair_count=0)
     a_step(db, job_id)
