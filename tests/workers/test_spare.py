@@ -30,7 +30,7 @@ from workers.slots import Slots
 from workers.spare import work_for_newcomer
 from workers.turns import coordinate
 
-LONG: dict[str, Any] = {"kind": "grow", "seed": {"q": [0.0, 0.0], "tries": 40}, "random_seed": 0, "cells": 200}
+LONG: dict[str, Any] = {"kind": "grow", "seed": {"q": [0.0, 0.0], "tries": 100}, "random_seed": 0, "cells": 200}
 """Many seedings in one step, which takes many times as long as all of a small job."""
 
 
