@@ -144,7 +144,8 @@ class Settings(BaseSettings):
     requests_file: Path | None = None
     """File in which one of several API processes on one port counts its requests; the others' files are in the same directory."""
     solve_processes: int = Field(default_factory=machine.cores, ge=1)
-    """This many processes solve pairs, one thread each. Default: the cores that they may use (db.machine)."""
+    """This many processes work at a time, one thread each, and one more does pieces of new jobs. Default: the cores that they may use
+    (db.machine)."""
 
     batch_seconds: float = 0.5
     """Pairs are certified together until their forecasts sum to this many seconds."""

@@ -3,7 +3,7 @@
 A message to the solvers only says that there is work. Which work it is, this module decides when a solver is free. It goes to the
 project whose work the fewest solvers do now, however many keys and jobs the project has; within it to the key of which the same is
 true; within the key to the job that was served least. So a newcomer gets the next solver that is free, however long pieces of others
-take. Projects and keys of which as many solvers work take turns.
+take. Projects and keys of which as many solvers work take turns. While no solver is free, a process beside them does pieces of new jobs.
 
 ``jobs.served`` counts the seconds that a job was given, divided by its share. The job with the least goes next (stride scheduling:
 Waldspurger, Weihl 1995). Each step of priority doubles a job's share of its key's work.
@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
+from datetime import timedelta
 from functools import cache
 
 from sqlalchemy import ColumnElement, Row, Select, and_, bindparam, case, exists, func, or_, select
@@ -28,8 +29,12 @@ from db.types import Utc, utcnow
 
 MOST_KEYS = 100_000
 """The jobs of at most this many keys are compared when the next one is chosen."""
+NEW_SECONDS = 60.0
+"""A job counts as new for this long after a solver has first begun a piece of it."""
 ROUNDING = 1e-9
 """Sums of fractions of batches may be too large by so much."""
+Placed = Row[tuple[str, str, str | None, float, int]]
+"""A job of :func:`_placed`."""
 
 
 def next_job(session: Session) -> str | None:
@@ -52,16 +57,36 @@ def _in_turn(session: Session, places: int, most: int) -> Sequence[str]:
     found = session.execute(_placed(), {"now": utcnow(), "places": places, "most": most}).all()
     if len(found) < 2:
         return [one.id for one in found]
-    of_project, of_key = _held(session)
+    return [one.id for one in _sorted(found, *_held(session))]
+
+
+def _sorted(found: Sequence[Placed], of_project: Counter[str], of_key: Counter[tuple[str, str | None]]) -> Sequence[Placed]:
+    """Returns jobs in the order of work, from the solvers that each project and each key has."""
     served: dict[str, float] = {}
     for one in found:
         served[one.project] = min(one.served, served.get(one.project, math.inf))
 
-    def turn(one: Row[tuple[str, str, str | None, float, int]]) -> tuple[int, int, float, str, int, float, str]:
+    def turn(one: Placed) -> tuple[int, int, float, str, int, float, str]:
         project, key = one.project, (one.project, one.key_id)
         return one.place, of_project[project], served[project], project, of_key[key], one.served, one.key_id or ""
 
-    return [one.id for one in sorted(found, key=turn)]
+    return sorted(found, key=turn)
+
+
+def newcomer(session: Session) -> str | None:
+    """Returns the id of the new job that gets a process beside the solvers, while they do other work; None when there is none.
+
+    It is the first in the order of work among those of which no solver does anything. A step that was begun before is left to the solvers.
+    A project for which more solvers work than for another one gets no process: its new jobs wait for its own.
+    """
+    now = utcnow()
+    since = now - timedelta(seconds=NEW_SECONDS)
+    found = session.execute(_placed(new=True), {"now": now, "since": since, "places": 1, "most": MOST_KEYS}).all()
+    if not found:
+        return None
+    of_project, _ = held = _held(session)
+    least = min(of_project.values(), default=0)
+    return next((one.id for one in _sorted(found, *held) if of_project[one.project] <= least), None)
 
 
 def others_wait(session: Session, job_id: str) -> bool:
@@ -108,28 +133,23 @@ def claim(session: Session, job_id: str, *, lease_seconds: float, batch_seconds:
 def to_give_up(session: Session) -> leases.Lost | None:
     """Returns the lease of a step that its holder is to give up, so that others get a solver within seconds; None when there is none.
 
-    That is when all solvers do steps, whose end nobody knows, and a project for which none works has work, or a job that nobody has begun
-    has pairs, which end within seconds. The project that holds most steps, if it holds several, gives up the one that was asked for last.
-    No step is given up twice. Work of other kinds ends within seconds, or gives way by itself.
+    That is when all solvers do steps, whose end nobody knows, and a project for which none works has work. The project that holds most
+    steps, if it holds several, gives up the one that was asked for last. No step is given up twice. Work of other kinds ends within
+    seconds, or gives way by itself.
     """
     long = (StepRow.state == StepState.RUNNING, StepRow.kind.not_in((LEAD, PIECE)))
     of_project = Counter(session.scalars(select(JobRow.project).join(StepRow, StepRow.job_id == JobRow.id).where(*long)))
     if max(of_project.values(), default=0) < 2 or of_project.total() < workers.solvers(session):
         return None
     firsts = session.execute(_placed(), {"now": utcnow(), "places": 1, "most": MOST_KEYS}).all()
-    reason = None
-    if any(first.project not in of_project for first in firsts):
-        reason = "another project had no solver"
-    elif session.scalar(_newcomer_with_pairs()) is not None:
-        reason = "a job that no solver had begun waited with pairs"
-    if reason is None or leases.count_of_keys(session).total() > of_project.total():
+    if all(first.project in of_project for first in firsts) or leases.count_of_keys(session).total() > of_project.total():
         return None
     ((project, _),) = of_project.most_common(1)
     of_it = select(StepRow).join(JobRow, JobRow.id == StepRow.job_id).where(*long, JobRow.project == project, StepRow.attempts == 1)
     step = session.scalar(of_it.order_by(StepRow.id.desc()).limit(1))
     if step is None:
         return None
-    return leases.Lost(step.job_id, step.lease_token or "", step.worker or "", reason, alone=False)
+    return leases.Lost(step.job_id, step.lease_token or "", step.worker or "", "another project had no solver", alone=False)
 
 
 def busy_solvers(session: Session, *, batch_seconds: float) -> int:
@@ -154,8 +174,7 @@ def busy_solvers(session: Session, *, batch_seconds: float) -> int:
 
 def jobs_without_solver(session: Session) -> int:
     """Returns how many jobs have work of which no solver does any."""
-    done = exists().where(StepRow.job_id == JobRow.id, StepRow.state == StepState.RUNNING)
-    waiting = select(func.count()).select_from(JobRow).where(_has_work(), JobRow.running_pairs == 0, ~done)
+    waiting = select(func.count()).select_from(JobRow).where(_has_work(), ~_has_solver())
     return session.scalar(waiting, {"now": utcnow()}) or 0
 
 
@@ -180,14 +199,18 @@ _NOW = bindparam("now", type_=Utc())
 
 
 @cache
-def _placed() -> Select[tuple[str, str, str | None, float, int]]:
+def _placed(new: bool = False) -> Select[tuple[str, str, str | None, float, int]]:
     """Returns the query for the jobs of each key in the order in which they are served: the one served least, and of several the newest.
 
     So a job that has just started gets its first piece at once, also beside a hundred of the same key.
+
+    Args:
+        new: whether only new jobs of which no solver does anything are among them, and steps that were begun before count as no work.
     """
     order = (JobRow.served, JobRow.created_at.desc(), JobRow.id)
     place = func.row_number().over(partition_by=(JobRow.project, JobRow.key_id), order_by=order).label("place")
-    placed = select(JobRow.id, JobRow.project, JobRow.key_id, JobRow.served, place).where(_has_work()).subquery()
+    work = and_(_is_new(), _has_work(fresh=True), ~_has_solver()) if new else _has_work()
+    placed = select(JobRow.id, JobRow.project, JobRow.key_id, JobRow.served, place).where(work).subquery()
     columns = (placed.c.id, placed.c.project, placed.c.key_id, placed.c.served, placed.c.place)
     return select(*columns).where(placed.c.place <= bindparam("places")).order_by(placed.c.place).limit(bindparam("most"))
 
@@ -195,11 +218,6 @@ def _placed() -> Select[tuple[str, str, str | None, float, int]]:
 @cache
 def _any() -> Select[str]:
     return select(JobRow.id).where(_has_work()).limit(1)
-
-
-@cache
-def _newcomer_with_pairs() -> Select[str]:
-    return select(JobRow.id).where(JobRow.state == JobState.RUNNING, JobRow.open_pairs > 0, JobRow.claimed_at.is_(None)).limit(1)
 
 
 @cache
@@ -212,9 +230,23 @@ def _has_region_now() -> Select[str]:
     return select(JobRow.id).where(JobRow.id == bindparam("job"), _has_region())
 
 
-def _has_work() -> ColumnElement[bool]:
-    """Returns the condition that :func:`claim` would find work."""
-    step = exists().where(steps.is_open(StepRow, JobRow.id, accepts=False))
+def _is_new() -> ColumnElement[bool]:
+    return or_(JobRow.claimed_at.is_(None), JobRow.claimed_at > bindparam("since", type_=Utc()))
+
+
+def _has_solver() -> ColumnElement[bool]:
+    """Returns the condition that a solver does a piece of the job."""
+    return or_(JobRow.running_pairs > 0, exists().where(StepRow.job_id == JobRow.id, StepRow.state == StepState.RUNNING))
+
+
+def _has_work(*, fresh: bool = False) -> ColumnElement[bool]:
+    """Returns the condition that :func:`claim` would find work.
+
+    Args:
+        fresh: whether steps that the job waits for and that were begun before do not count.
+    """
+    is_open = steps.is_open(StepRow, JobRow.id, accepts=False)
+    step = exists().where(is_open & (StepRow.attempts == 0) if fresh else is_open)
     return or_(and_(JobRow.state == JobState.RUNNING, or_(JobRow.open_pairs > 0, step)), _has_region())
 
 

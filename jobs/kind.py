@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, ClassVar
@@ -179,7 +181,34 @@ def in_child(function: str, payload: dict[str, Any], kept: tuple[str, str] | Non
 
     Args:
         kept, tell: as for certifier.isolation.child.run_in_child.
+
+    Raises:
+        CirisError: as :func:`certifier.isolation.child.run_in_child`.
+        GivesWay: what :func:`giving_way` was given has raised it.
     """
-    seconds, memory = settings().time_limit_seconds, settings().child_memory_bytes
-    found: dict[str, Any] = run_in_child(function, payload, timeout_s=seconds, memory_bytes=memory, kept=kept, tell=tell)
+    look, seconds, memory = _look.get(), settings().time_limit_seconds, settings().child_memory_bytes
+
+    def heard(told: dict[str, Any]) -> None:
+        look()
+        if tell is not None:
+            tell(told)
+
+    found: dict[str, Any] = run_in_child(function, payload, timeout_s=seconds, memory_bytes=memory, kept=kept, tell=heard)
     return found
+
+
+class GivesWay(Exception):
+    """A step is given up while its child computes. It begins anew when it is its job's turn."""
+
+
+_look: ContextVar[Callable[[], None]] = ContextVar("look", default=lambda: None)
+
+
+@contextmanager
+def giving_way(look: Callable[[], None]) -> Iterator[None]:
+    """Calls ``look`` every second that a step waits for a child within the block. It raises GivesWay when the step is to be given up."""
+    token = _look.set(look)
+    try:
+        yield
+    finally:
+        _look.reset(token)

@@ -1,8 +1,8 @@
 """``python -m workers control`` or ``python -m workers solve`` runs one Celery worker, with the settings of the environment.
 
 The control worker coordinates jobs in threads, runs the sweeper, delivers webhooks and copies SQLite's log into its database. The solve
-worker runs ``CIRIS_SOLVE_PROCESSES`` processes, after it has loaded what they call (certifier.jobs.kernels). Each computes in one thread,
-because the pairs already run in parallel.
+worker runs ``CIRIS_SOLVE_PROCESSES`` processes, and one for new jobs (workers.spare), after it has loaded what they call
+(certifier.jobs.kernels). Each computes in one thread, because the pairs already run in parallel.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from typing import Any
 
 NURSERY_S = 60.0
 """A process that solves takes work when it has what makes proposals, or after this many seconds."""
+SPARE = 1
+"""A solve worker has so many processes more, which do pieces of new jobs while the others work (workers.spare)."""
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 
@@ -55,7 +57,8 @@ def main() -> None:
     app = celery_app()
     register(app, queue)
     app.steps["worker"].add(Heartbeat)
-    pool = ["--pool=threads", "--concurrency=2"] if queue == CONTROL else ["--pool=prefork", f"--concurrency={settings().solve_processes}"]
+    forked = settings().solve_processes + SPARE
+    pool = ["--pool=threads", "--concurrency=2"] if queue == CONTROL else ["--pool=prefork", f"--concurrency={forked}"]
     if queue == SOLVE:
         from certifier.jobs import kernels
 

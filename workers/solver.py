@@ -41,6 +41,11 @@ def work() -> Piece | None:
         return None
     if more:
         send_work()
+    return do(claim)
+
+
+def do(claim: pairs.Claim | steps.Claim) -> Piece:
+    """Does a claimed piece of work."""
     settles = carry_out(claim) if isinstance(claim, steps.Claim) else certify_pairs(claim)
     return Piece(claim.job_id, settles)
 

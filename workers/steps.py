@@ -18,10 +18,11 @@ from db.states import ACCEPT, JobState, StepState
 from db.transaction import persistently
 from db.types import utcnow
 from jobs.failures import IN_LOG, LOST, ON_LOSS
-from jobs.kind import Done
+from jobs.kind import Done, GivesWay
 from jobs.registry import KINDS
 from jobs.scenes import load_scene
 from workers.app import send_work
+from workers.sweeper import give_up
 
 log = logging.getLogger(__name__)
 
@@ -35,6 +36,9 @@ def carry_out(claim: steps.Claim) -> bool:
     with bound, traced as span, leases.kept(database(), StepRow, claim.token, settings().lease_seconds, wanted):
         try:
             state, done = StepState.DONE, _do(claim)
+        except GivesWay:
+            give_up(leases.Lost(claim.job_id, claim.token, leases.this_worker(), "other new jobs waited", alone=False))
+            return False
         except CirisError as error:
             state, done = StepState.FAILED, Done(error.to_document())
         except Exception:

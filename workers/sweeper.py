@@ -176,7 +176,12 @@ def give_way() -> None:
     with database().read() as session:
         lease = work.to_give_up(session)
     if lease is not None:
-        _release(lease, _release_step)
+        give_up(lease)
+
+
+def give_up(lease: leases.Lost) -> None:
+    """Opens a step that its holder does not do to its end."""
+    _release(lease, _release_step)
 
 
 def _release_step(session: Session, _job: JobRow, lease: leases.Lost) -> Sequence[StepRow]:

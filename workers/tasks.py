@@ -13,6 +13,7 @@ from celery import Celery, Task
 from structlog.contextvars import bound_contextvars
 
 from db.session import UNAVAILABLE
+from db.settings import settings
 from workers.app import CONTROL, COORDINATE, WORK
 from workers.messages import Acknowledged
 
@@ -31,16 +32,20 @@ def register(app: Celery, queue: str) -> None:
 
         return
 
+    from workers.slots import Slots
     from workers.solver import work
+    from workers.spare import work_for_newcomer
     from workers.sweeper import release_lost
     from workers.turns import coordinate
 
+    slots = Slots(settings().solve_processes)
+
     @app.task(name=WORK, bind=True, Request=Acknowledged)
     def _work(self: Task) -> None:
-        with _left_to_the_sweeper():
+        with _left_to_the_sweeper(), slots.one() as mine:
             if self.request.delivery_info.get("redelivered"):
                 release_lost(by_time=False)  # the worker that had this message has died
-            piece = work()
+            piece = work() if mine else work_for_newcomer(slots)
             if piece is not None and piece.settles:
                 coordinate(piece.job_id)
 

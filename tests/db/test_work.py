@@ -225,6 +225,64 @@ def test_a_project_keeps_the_only_solver_that_it_has(db: Database) -> None:
     assert given_up(db) is None
 
 
+def newcomer(db: Database) -> str | None:
+    with db.read() as session:
+        return work.newcomer(session)
+
+
+def test_a_new_job_is_one_that_nobody_works_for_and_that_was_begun_a_moment_ago(db: Database) -> None:
+    job_id = a_job_of(db, pair_count=4)
+    assert newcomer(db) == job_id
+    with db.write() as session:
+        claim = work.claim(session, job_id, lease_seconds=60, batch_seconds=0.5)
+        assert isinstance(claim, pairs.Claim)
+    assert newcomer(db) is None, "a solver does a piece of it"
+    with db.write() as session:
+        pairs.give_back(session, claim)
+    assert newcomer(db) == job_id
+    with db.write() as session:
+        jobs.lock(session, job_id).claimed_at = utcnow() - timedelta(seconds=work.NEW_SECONDS)
+    assert newcomer(db) is None
+
+
+def test_a_new_job_that_is_cancelled_need_not_wait_for_its_region_to_be_accepted(db: Database) -> None:
+    job_id = a_job_of(db, pair_count=0)
+    with db.write() as session:
+        job = jobs.lock(session, job_id)
+        steps.add(session, job, "accept", {})
+        jobs.claimed(job)
+        jobs.cancel(session, job_id)
+    assert newcomer(db) == job_id
+
+
+def test_a_step_that_was_begun_before_is_left_to_the_solvers(db: Database) -> None:
+    job_id = a_job_of(db, pair_count=0)
+    a_step(db, job_id)
+    assert newcomer(db) == job_id
+    claim = claimed_step(db, job_id)
+    with db.write() as session:
+        leases.release(session, StepRow, leases.Lost(job_id, claim.token, "", "", alone=False))
+    assert newcomer(db) is None
+    with db.read() as session:
+        assert work.next_job(session) == job_id
+
+
+def test_new_jobs_of_a_project_that_has_more_solvers_than_another_wait(db: Database) -> None:
+    """However many small jobs it asks for, it does not take the part of others."""
+    for project, held in (("a", 2), ("b", 1)):
+        for i in range(held):
+            job_id = a_job_of(db, f"{project}{i}", project=project, pair_count=0)
+            a_step(db, job_id)
+            claimed_step(db, job_id)
+    small = a_job_of(db, "a9", project="a")
+    assert newcomer(db) is None
+    other = a_job_of(db, "b9", project="b")
+    assert newcomer(db) == other
+    with db.write() as session:
+        work.claim(session, other, lease_seconds=60, batch_seconds=0.5)
+    assert newcomer(db) == small, "both have as many"
+
+
 def test_a_job_gets_its_first_piece_at_once_beside_a_hundred_of_its_key(db: Database) -> None:
     for _ in range(100):
         a_job_of(db, "key", pair_count=20)

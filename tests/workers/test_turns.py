@@ -105,11 +105,9 @@ def test_a_batch_is_done_to_its_end_while_nobody_else_waits(job_id: str, monkeyp
     assert work() == Piece(job_id, True)
 
 
-@pytest.mark.parametrize("where", ["another project", "the same key"])
-def test_a_long_step_is_given_up_for_a_job_with_pairs(job_id: str, where: str) -> None:
-    """The job has pairs, and nobody has begun it. Two others seed, on the two processes that there are."""
-    if where == "another project":
-        of_another_project(job_id)
+def test_a_long_step_is_given_up_for_a_job_of_another_project(job_id: str) -> None:
+    """Two jobs seed, on the two processes that there are."""
+    of_another_project(job_id)
     claims = []
     with database().write() as session:
         workers.tell(session, Made("host:1:1", WorkerKind.SOLVE, "1", 2, cores=2, memory_bytes=1), WorkerState.RUNNING)
@@ -123,8 +121,7 @@ def test_a_long_step_is_given_up_for_a_job_with_pairs(job_id: str, where: str) -
         assert [row.state for row in session.scalars(select(StepRow).order_by(StepRow.id))] == ["running", "open"]
     assert claims[1] is not None
     lost = [event.data for event in events_of(claims[1].job_id) if event.kind == "lost"]
-    reason = {"another project": "another project had no solver", "the same key": "a job that no solver had begun waited with pairs"}[where]
-    assert [(one["step"], one["reason"]) for one in lost] == [("propose", reason)]
+    assert [(one["step"], one["reason"]) for one in lost] == [("propose", "another project had no solver")]
     assert waiting(SOLVE) > 0
     with database().write() as session:  # what was given up begins again, and is not given up again
         again = steps.claim(session, jobs.lock(session, claims[1].job_id), accepts=False, lease_seconds=60)
@@ -135,9 +132,9 @@ def test_a_long_step_is_given_up_for_a_job_with_pairs(job_id: str, where: str) -
         assert [row.state for row in session.scalars(select(StepRow).order_by(StepRow.id))] == ["running", "running"]
 
 
-def test_no_step_is_given_up_for_a_job_that_was_begun(job_id: str) -> None:
+def test_no_step_is_given_up_for_a_job_of_the_same_key(job_id: str) -> None:
+    """It is new, and gets the process that a worker has for new jobs."""
     with database().write() as session:
-        jobs.claimed(jobs.lock(session, job_id))
         workers.tell(session, Made("host:1:1", WorkerKind.SOLVE, "1", 2, cores=2, memory_bytes=1), WorkerState.RUNNING)
         for _ in range(2):
             job = a_job(session)

@@ -1,0 +1,116 @@
+"""A small job gets a process although all do work that lasts, and the long jobs lose nothing by it."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from sqlalchemy import select, update
+
+from certifier.growth.options import GrowthOptions
+from certifier.jobs.local import grow
+from certifier.model import Scene
+from db import jobs, leases, workers
+from db.models import JobRow, StepRow, WorkerRow
+from db.session import database
+from db.states import WorkerState
+from db.workers import Made, WorkerKind
+from tests.scenes import slider
+from tests.services import Queue
+from tests.workers.options import box_around, grow_box
+from tests.workers.record import check_record, region_of
+from tests.workers.service import ended, events_of, eventually, job_of, running_service, submit
+from workers import spare
+from workers.app import SOLVE, waiting
+from workers.slots import Slots
+from workers.spare import work_for_newcomer
+from workers.turns import coordinate
+
+LONG: dict[str, Any] = {"kind": "grow", "seed": {"q": [0.0, 0.0], "tries": 100}, "random_seed": 0, "cells": 200}
+"""Many seedings in one step, which takes many times as long as all of a small job."""
+
+
+def seeding(job_id: str) -> StepRow | None:
+    with database().read() as session:
+        return session.scalar(select(StepRow).where(StepRow.job_id == job_id, StepRow.kind == "propose", StepRow.state == "running"))
+
+
+def lost(job_id: str) -> list[str]:
+    return [event.data["reason"] for event in events_of(job_id) if event.kind == "lost"]
+
+
+@pytest.mark.slow
+def test_a_small_job_ends_before_the_seedings_that_have_all_processes(
+    planar: Scene, sqlite_url: str, own_queue: Queue, tmp_path: Path
+) -> None:
+    own_queue.flush()
+    with running_service(sqlite_url, own_queue.url, tmp_path):
+        assert ended(submit(planar, box_around(np.zeros(2), 0.1))).outcome == "certified"
+        first, second = (submit(planar, LONG) for _ in range(2))
+        eventually(lambda: seeding(first) and seeding(second), "both seed")
+        for kind in ("cancelled", "killed", "given up"):
+            third = submit(planar, LONG)
+            step = eventually(lambda job=third: seeding(job), "the new job seeds beside them")  # type: ignore[misc]
+            if kind == "cancelled":
+                with database().write() as session:
+                    jobs.cancel(session, third)
+                assert ended(third).state == "cancelled"
+            elif kind == "killed":
+                os.kill(int((step.worker or "").rsplit(":", 2)[1]), signal.SIGKILL)
+                eventually(lambda job=third: lost(job) == ["its process died"], "the step is free again")  # type: ignore[misc]
+        small = submit(planar, grow_box(planar.to_s([0.0, 0.0]), 0.22, cells=200))
+        assert ended(small).outcome == "certified"
+        assert seeding(first) is not None
+        assert seeding(second) is not None
+        assert lost(third) == ["other new jobs waited"]
+        assert lost(first) == lost(second) == []
+        for job in (first, second, third):
+            assert ended(job).outcome == "certified"
+            check_record(job)
+        alone = grow(planar, GrowthOptions.from_document(LONG)).manifest
+        for job in (first, second, third):
+            found = region_of(job)
+            assert all(found[name] == alone[name] for name in ("halfspace_normals", "halfspace_offsets", "inscribed_ellipsoid"))
+
+
+@pytest.fixture
+def no_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spare, "WAIT_SECONDS", 0.1)
+    monkeypatch.setattr(spare, "LOOK_SECONDS", 0.05)
+
+
+@pytest.mark.usefixtures("no_wait")
+def test_without_a_slot_only_what_new_jobs_wait_for_is_done(job_id: str, own_queue: Queue) -> None:
+    own_queue.flush()
+    piece = work_for_newcomer(Slots(0))
+    assert piece is not None
+    assert piece.job_id == job_id
+    assert waiting(SOLVE) == 1, "the message is there for others"
+    other = submit(slider(posts=3), box_around([0.0], 0.2))
+    coordinate(other)
+    with database().write() as session:
+        session.execute(update(JobRow).where(JobRow.id == other).values(claimed_at=job_of(other).created_at.replace(year=2000)))
+    assert work_for_newcomer(Slots(0)) is None, "the job is not new any more"
+
+
+@pytest.mark.usefixtures("no_wait")
+def test_who_gets_a_slot_leaves_the_rest_to_a_message(job_id: str) -> None:
+    with Slots(1).one():
+        assert work_for_newcomer(Slots(1)) is None
+    assert job_of(job_id).claimed_at is None
+
+
+@pytest.mark.usefixtures("no_wait")
+def test_a_worker_that_is_to_pause_begins_nothing_for_new_jobs(job_id: str) -> None:
+    made = Made(leases.parent_worker(), WorkerKind.SOLVE, "1", 1, cores=1, memory_bytes=1)
+    with database().write() as session:
+        workers.tell(session, made, WorkerState.RUNNING)
+        session.execute(update(WorkerRow).values(wanted=WorkerState.PAUSED))
+    assert work_for_newcomer(Slots(0)) is None
+    with database().write() as session:
+        session.execute(update(WorkerRow).values(wanted=WorkerState.RUNNING))
+    assert work_for_newcomer(Slots(0)) is not None
