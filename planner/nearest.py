@@ -1,4 +1,4 @@
-"""This module finds the point of a polytope, of all regions, and of two regions, that is nearest. Distances are those of s.
+"""This module finds the point of a polytope, of all regions and a map, and of two regions, that is nearest. Distances are those of s.
 
 These are answers for planners and prove nothing: they are found in floating point.
 """
@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from certifier.model import Array
+from certifier.model import Array, Scene
 from certifier.positions import check_magnitude
+from ciris.free_set import BOXES, FreeSet
 from planner.library import Library
 
 INWARDS = 1e-9
@@ -25,17 +26,51 @@ _ROUNDS, _SETTLED = 200, 1e-6
 
 @dataclass(frozen=True)
 class Nearest:
-    """Names the region that is nearest to a point.
+    """Names what is nearest to a point: a region, or the map.
 
     Attributes:
-        region: the region's number in the library.
-        s: (n,) the nearest point of the region; the point itself where it is inside.
+        region: the region's number in the library; None for the map.
+        s: (n,) the nearest point; the point itself where it is inside.
         distance: from the point to that, in s; 0 where the point is inside.
     """
 
-    region: int
+    region: int | None
     s: Array
     distance: float
+
+
+@dataclass(frozen=True)
+class Proved:
+    """Says what is proved nearest to a point.
+
+    Attributes:
+        nearest: None where nothing is proved.
+        complete: whether nothing nearer is proved; False where the search in the map ended early.
+        boxes: how many boxes of the map the search looked at.
+    """
+
+    nearest: Nearest | None
+    complete: bool
+    boxes: int
+
+
+def nearest_proved(library: Library, free: FreeSet | None, scene: Scene, s: Array, boxes: int = BOXES) -> Proved:
+    """Returns which point is nearest to s, (n,), of all regions and the map's free set.
+
+    Args:
+        free: None where the scene has no map.
+        boxes: the search in the map ends after about so many boxes.
+
+    Raises:
+        RegionError: number_too_large.
+    """
+    region = nearest(library, s)
+    if free is None or (region is not None and region.distance == 0):
+        return Proved(region, True, 0)
+    found = free.nearest(scene.to_q(s), closer_than=np.inf if region is None else region.distance, boxes=boxes)
+    if found.q is None or found.distance is None:
+        return Proved(region, found.complete, found.boxes)
+    return Proved(Nearest(None, s if found.distance == 0 else scene.to_s(found.q), found.distance), found.complete, found.boxes)
 
 
 def nearest(library: Library, s: Array, without: Collection[int] = ()) -> Nearest | None:

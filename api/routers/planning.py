@@ -36,15 +36,19 @@ from api.schemas.planning import (
 from api.strict import StrictRoute
 from certifier.model import Array, Scene
 from certifier.motion.splines import Curve, curve
+from ciris.free_set import BOXES
 from db.session import Database
 from planner.library import Library
 from planner.membership import locate, to_s
 from planner.motion.path import follow
 from planner.motion.space import Space
-from planner.nearest import nearest
+from planner.nearest import nearest_proved
 from planner.tubes import Tubes
 
 router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ], route_class=StrictRoute)
+
+BOXES_OF_REQUEST = 5 * BOXES
+"""All searches of one request for the nearest point look at so many boxes of the map at most, in some seconds. Few need a thousand."""
 
 
 @router.post("/contains")
@@ -73,14 +77,22 @@ def contains(body: ContainsRequest, db: Db, libraries: KeptLibraries, motions: K
 
 @router.post("/nearest")
 @asking(few=50)
-def find_nearest(body: NearestRequest, db: Db, libraries: KeptLibraries) -> NearestResponse:
-    """Returns, for each point, the nearest certified region of the scene, its nearest point and how far that is."""
+def find_nearest(body: NearestRequest, db: Db, libraries: KeptLibraries, free_sets: KeptFreeSets) -> NearestResponse:
+    """Returns, for each point, the nearest point that a certified region or the scene's latest map proves free, and how far that is."""
     scene_id, scene, library = asked(db, libraries, body.scene)
     body = with_positions(db, scene, body)
     points = _points(scene, body.q, body.s)
-    found = [nearest(library, s) if np.isfinite(s).all() else None for s in points]
-    points_found = [NearestPoint(nearest=answers.near(library, scene, near)) for near in found]
-    return NearestResponse(scene=scene_id, version=library.version, regions=len(library), points=points_found)
+    mapped = free_sets.of(db, scene_id)
+    free, job = (None, None) if mapped is None else (mapped.free, mapped.job)
+    left, found = BOXES_OF_REQUEST, []
+    for s in points:
+        if not np.isfinite(s).all():
+            found.append(NearestPoint(nearest=None, complete=True))
+            continue
+        proved = nearest_proved(library, free, scene, s, min(BOXES, left))
+        left -= proved.boxes
+        found.append(NearestPoint(nearest=answers.near(library, scene, proved.nearest, job), complete=proved.complete))
+    return NearestResponse(scene=scene_id, version=library.version, regions=len(library), map=job, points=found)
 
 
 @router.post("/segment")
