@@ -25,7 +25,7 @@ TOLERANCE = 1e-9
 """A configuration counts as open within TOLERANCE of an open cell in each joint, in radians or metres. Where a joint's limits are beyond 1,
 TOLERANCE is a part of the larger one. This covers rounding errors."""
 BOXES = 20_000
-"""A search for the nearest proved configuration ends after about so many boxes: a third of a second, where there are 50 pairs."""
+"""A search for the nearest proved configuration ends after about this many boxes: a third of a second, where there are 50 pairs."""
 LARGEST = 1 << 30
 """No file is read that has more bytes than this, packed or unpacked."""
 DAMAGES = (
@@ -167,7 +167,7 @@ class FreeSet(InSpace):
 
         Args:
             closer_than: only what is closer than this counts, in s.
-            boxes: the search ends after about so many boxes; with what it has found by then.
+            boxes: the search ends after about this many boxes; with what it has found.
 
         Raises:
             RegionError: points; wrong_length, also for several configurations; outside_window, for a joint that is half a turn from q*.

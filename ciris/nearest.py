@@ -19,8 +19,8 @@ from ciris.lookups import DEPTH, OPEN, Cells, Floats, lower_part
 MARGIN = 2.0
 """The answer is this many tolerances away from open cells and from the joint limits, so that rounding leaves it free."""
 PLUNGE = 64
-"""At every so many boxes, and until something is found, the search goes on with the nearest part of the same box. So an early end has found
-something."""
+"""After each such number of boxes, and until something is found, the search goes on with the nearest part of the same box. So an early end
+has found something."""
 ROOM = 256
 """There is room for this many boxes at first."""
 
@@ -46,7 +46,7 @@ def nearest(cells: Cells, aim: Aim, closer_than: float, most: int, found: Floats
 
     Args:
         closer_than: only what is closer than this counts, in s.
-        most: the search ends after about so many boxes.
+        most: the search ends after about this many boxes.
 
     Returns:
         The distance, ``closer_than`` if nothing was found; the number of boxes; whether it is certain that nothing is closer.

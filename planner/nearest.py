@@ -18,6 +18,8 @@ from planner.library import Library
 
 INWARDS = 1e-9
 """The nearest point lies this far behind every face, in s, so that rounding does not take it out of its region."""
+TOGETHER = 5 * BOXES
+"""The searches in the map for all points of one question look at this many boxes at most, in some seconds. Most points need a hundred."""
 _INFEASIBLE = 1e-10
 """The residual of a least distance program without a solution is 0; rounding leaves it below this."""
 _ROUNDS, _SETTLED = 200, 1e-6
@@ -46,31 +48,38 @@ class Proved:
     Attributes:
         nearest: None where nothing is proved.
         complete: whether nothing nearer is proved; False where the search in the map ended early.
-        boxes: how many boxes of the map the search looked at.
     """
 
     nearest: Nearest | None
     complete: bool
-    boxes: int
 
 
-def nearest_proved(library: Library, free: FreeSet | None, scene: Scene, s: Array, boxes: int = BOXES) -> Proved:
-    """Returns which point is nearest to s, (n,), of all regions and the map's free set.
+def nearest_proved(library: Library, free: FreeSet | None, scene: Scene, points: Array) -> list[Proved]:
+    """Returns what is nearest to each of the points s, (k, n), of all regions and the map's free set; nothing for a row that is not finite.
+
+    All searches in the map look at TOGETHER boxes at most.
 
     Args:
         free: None where the scene has no map.
-        boxes: the search in the map ends after about so many boxes.
 
     Raises:
         RegionError: number_too_large.
     """
-    region = nearest(library, s)
-    if free is None or (region is not None and region.distance == 0):
-        return Proved(region, True, 0)
-    found = free.nearest(scene.to_q(s), closer_than=np.inf if region is None else region.distance, boxes=boxes)
-    if found.q is None or found.distance is None:
-        return Proved(region, found.complete, found.boxes)
-    return Proved(Nearest(None, s if found.distance == 0 else scene.to_s(found.q), found.distance), found.complete, found.boxes)
+    left, found = TOGETHER, []
+    for s in points:
+        if not np.isfinite(s).all():
+            found.append(Proved(None, True))
+            continue
+        near = nearest(library, s)
+        if free is None or (near is not None and near.distance == 0):
+            found.append(Proved(near, True))
+            continue
+        closest = free.nearest(scene.to_q(s), closer_than=np.inf if near is None else near.distance, boxes=min(BOXES, left))
+        left -= closest.boxes
+        if closest.q is not None and closest.distance is not None:
+            near = Nearest(None, s if closest.distance == 0 else scene.to_s(closest.q), closest.distance)
+        found.append(Proved(near, closest.complete))
+    return found
 
 
 def nearest(library: Library, s: Array, without: Collection[int] = ()) -> Nearest | None:

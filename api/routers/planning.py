@@ -36,7 +36,6 @@ from api.schemas.planning import (
 from api.strict import StrictRoute
 from certifier.model import Array, Scene
 from certifier.motion.splines import Curve, curve
-from ciris.free_set import BOXES
 from db.session import Database
 from planner.library import Library
 from planner.membership import locate, to_s
@@ -46,9 +45,6 @@ from planner.nearest import nearest_proved
 from planner.tubes import Tubes
 
 router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ], route_class=StrictRoute)
-
-BOXES_OF_REQUEST = 5 * BOXES
-"""All searches of one request for the nearest point look at so many boxes of the map at most, in some seconds. Few need a thousand."""
 
 
 @router.post("/contains")
@@ -84,14 +80,10 @@ def find_nearest(body: NearestRequest, db: Db, libraries: KeptLibraries, free_se
     points = _points(scene, body.q, body.s)
     mapped = free_sets.of(db, scene_id)
     free, job = (None, None) if mapped is None else (mapped.free, mapped.job)
-    left, found = BOXES_OF_REQUEST, []
-    for s in points:
-        if not np.isfinite(s).all():
-            found.append(NearestPoint(nearest=None, complete=True))
-            continue
-        proved = nearest_proved(library, free, scene, s, min(BOXES, left))
-        left -= proved.boxes
-        found.append(NearestPoint(nearest=answers.near(library, scene, proved.nearest, job), complete=proved.complete))
+    found = [
+        NearestPoint(nearest=answers.near(library, scene, proved.nearest, job), complete=proved.complete)
+        for proved in nearest_proved(library, free, scene, points)
+    ]
     return NearestResponse(scene=scene_id, version=library.version, regions=len(library), map=job, points=found)
 
 

@@ -11,7 +11,6 @@ from fastapi.testclient import TestClient
 
 from api import graph
 from api.app import create_app
-from api.routers import planning
 from certifier.jobs.map import grow_map
 from certifier.jobs.region import Region, certified_region
 from certifier.map.free_set import as_file, free_set
@@ -21,7 +20,7 @@ from db import jobs, overlaps, regions
 from db.models import StepRow
 from db.session import Database
 from db.states import ACCEPT, StepState
-from planner import overlap
+from planner import nearest, overlap
 from tests.api.conftest import BASE_URL, store_region
 from tests.certifier.scenes import accepted
 from tests.db.builders import a_running_job, add_region
@@ -90,7 +89,7 @@ def test_nearest_names_the_map_where_it_is_nearer_than_all_regions(
     assert in_s[0]["nearest"] == at_post
     assert in_s[1]["nearest"]["distance"] == pytest.approx(2.0), "the joint ends at 1 m"
 
-    monkeypatch.setattr(planning, "BOXES_OF_REQUEST", 1)
+    monkeypatch.setattr(nearest, "TOGETHER", 1)
     first, second = client.post("/v1/planning/nearest", json=asked | {"q": [[0.5], [0.5]]}).json()["points"]
     assert (first["complete"], second["complete"]) == (False, False)
     assert second["nearest"]["region"] == region, "the regions are looked at nonetheless"
