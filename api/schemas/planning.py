@@ -200,7 +200,7 @@ class Near(BaseModel):
     """Names a region near a point, or the map. The nearest point is found in floating point. It lies 1e-9 behind every face, in s."""
 
     region: RegionId | None = Field(description="The region; null for the map.", examples=[REGION])
-    map: MapJob | None = Field(default=None, description="The job that has grown the map; null for a region.")
+    map: MapJob | None = Field(default=None, description="The job that has grown the map; null for a region.", examples=[MAP])
     guarantee: Guarantee = Field(description="What the certificate is worth.", examples=["exact"])
     distance: Distance
     q: Q
