@@ -50,12 +50,13 @@ def uncovered(library: Library, scene: Scene, stop: path.Uncovered | None) -> Un
     )
 
 
-def near(library: Library, scene: Scene, found: Nearest | None) -> Near | None:
+def near(library: Library, scene: Scene, found: Nearest | None, map_job: str | None = None) -> Near | None:
     if found is None:
         return None
     return Near(
-        region=library.ids[found.region],
-        guarantee=guarantee(library, found.region),
+        region=None if found.region is None else library.ids[found.region],
+        map=map_job if found.region is None else None,
+        guarantee=Guarantee.EXACT if found.region is None else guarantee(library, found.region),
         distance=found.distance,
         q=scene.to_q(found.s).tolist(),
         s=found.s.tolist(),

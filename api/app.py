@@ -49,6 +49,7 @@ from api.routers import (
     webhooks,
     workers,
 )
+from api.unanswered import Unanswered
 from api.writing import WRITERS
 from certifier.isolation.confinement import probed
 from certifier.scene.bundle import expect_bundles
@@ -93,6 +94,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.links = LinksKept()
     app.state.motions = MotionsKept()
     app.state.free_sets = FreeSetsKept()
+    app.state.unanswered = Unanswered()
     app.state.outlines = OutlinesKept()
     app.state.room = Room()
     app.state.keyring = Keyring(app.state.database, open_without_keys=settings().loopback and not settings().oidc_issuer)

@@ -21,6 +21,7 @@ from api.motions import Known, MotionsKept
 from api.named import with_positions
 from api.schemas.planning import Piece
 from api.schemas.plans import BeyondLimit, Collision, LineStop, PlanGap, PlanRequest, PlanResponse, Reached, Reason
+from api.unanswered import Unanswered
 from certifier.errors import CirisError, RegionError
 from certifier.isolation.child import run_in_child
 from certifier.model import Array, Scene
@@ -36,6 +37,10 @@ from planner.trajectory.plan import Answer, Apart, Limits, Outside, Trajectory, 
 TIMEOUT_S = 60.0
 
 
+_UNANSWERED = {Reason.START_UNCOVERED, Reason.GOAL_UNCOVERED, Reason.DISCONNECTED, Reason.NO_MOTION}
+"""For these reasons a map may help: its job may begin with the configurations of the question."""
+
+
 @dataclass(frozen=True)
 class Asked:
     """Holds what an API process knows about the scenes that it is asked about."""
@@ -44,6 +49,7 @@ class Asked:
     libraries: Libraries
     links: LinksKept
     motions: MotionsKept
+    unanswered: Unanswered
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +86,8 @@ def answer(asked: Asked, body: PlanRequest) -> PlanResponse:
         if body.regions_only or isinstance(through, Trajectory):
             found = _of_regions(question, through)
     found = found or _searched(asked, question, body)
+    if found.get("reason") in _UNANSWERED:
+        asked.unanswered.note(asked.db, scene_id, scene.in_windows(np.array([*question.points, *question.goals])))
     if body.prove and found["found"]:
         found["proof"] = _proof(question.scene, found["q"])
     return PlanResponse(**of_scene, complete=complete, **found)

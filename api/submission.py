@@ -25,11 +25,12 @@ from workers import addresses
 
 @dataclass(frozen=True)
 class Checked:
-    """A request whose names and numbers fit its scene, the options that the job will have, and warnings about it."""
+    """A request whose names and numbers fit its scene, its options, those that a new job has then, and warnings about it."""
 
     body: JobRequest
     scene_id: str
     options: dict[str, Any]
+    completed: dict[str, Any]
     warnings: list[str]
 
 
@@ -54,7 +55,8 @@ def checked(db: Database, body: JobRequest, where: str = "") -> Checked:
         if where:
             error.field = f"{where}.{error.field}" if error.field else where
         raise
-    return Checked(body, scene_id, options, KINDS[body.kind].warnings(options, scene))
+    kind = KINDS[body.kind]
+    return Checked(body, scene_id, options, kind.completed(options, scene_id, scene, db), kind.warnings(options, scene))
 
 
 def submit(session: Session, asked: Checked, caller: Caller, idempotency_key: str | None) -> tuple[JobRow, bool]:
@@ -83,7 +85,7 @@ def _submit(session: Session, asked: Checked, caller: Caller, stored_key: str | 
         session,
         kind=body.kind,
         scene_id=asked.scene_id,
-        options=asked.options,
+        options=asked.completed,
         deadline_seconds=body.deadline_seconds,
         idempotency_key=stored_key,
         request_digest=digest,

@@ -124,25 +124,29 @@ class Containment(Answers[Contained]):
 
 @dataclass(frozen=True, eq=False)
 class Near:
-    """A region near a point, and its point that is nearest."""
+    """A region near a point, or the map, and its point that is nearest."""
 
-    region: str
-    """Id of the region."""
+    region: str | None
+    """Id of the region; None for the map."""
     guarantee: Guarantee
     distance: float
     """Euclidean distance in s, 0 inside."""
     q: Array
-    """(n,) the nearest point of the region."""
+    """(n,) the nearest point of the region or the map."""
     s: Array
     """(n,) the same point in s."""
+    map: str | None = None
+    """Id of the job that has grown the map; None for a region."""
+    complete: bool = True
+    """Whether nothing nearer is proved. False where the search in the map ended early, after much work."""
 
 
 class Nearest(Answers[Near | None]):
-    """The region that is nearest to each of k points; None where there is none, or where a joint is outside of its limits."""
+    """What is proved nearest to each of k points, by a region or the map; None where nothing was found, or a joint is beyond its limits."""
 
     @property
     def distance(self) -> Array:
-        """(k,) distances in s; NaN where there is no region."""
+        """(k,) distances in s; NaN where nothing was found."""
         return np.array([np.nan if near is None else near.distance for near in self])
 
 

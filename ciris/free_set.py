@@ -24,6 +24,8 @@ FORMAT = 1
 TOLERANCE = 1e-9
 """A configuration counts as open within TOLERANCE of an open cell in each joint, in radians or metres. Where a joint's limits are beyond 1,
 TOLERANCE is a part of the larger one. This covers rounding errors."""
+BOXES = 20_000
+"""A search for the nearest proved configuration ends after about this many boxes: a third of a second, where there are 50 pairs."""
 LARGEST = 1 << 30
 """No file is read that has more bytes than this, packed or unpacked."""
 DAMAGES = (
@@ -52,6 +54,20 @@ class OpenPart:
     """From this share of the motion to that one, in [0, 1]."""
     pairs: tuple[tuple[str, str], ...]
     """The names of their geometries."""
+
+
+@dataclass(frozen=True, eq=False)
+class Closest:
+    """The proved configuration that is nearest to another one."""
+
+    q: Array | None
+    """(n,); None where none was found."""
+    distance: float | None
+    """Euclidean distance in s; 0 where the other one is proved itself, None where none was found."""
+    complete: bool
+    """Whether none is nearer. False where the search ended early."""
+    boxes: int
+    """How many boxes the search looked at."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -110,6 +126,7 @@ class FreeSet(InSpace):
         found.contains(middle)
         found.contains_motion(middle, middle)
         found.open_parts(middle, middle)
+        found.nearest(found.q_star, closer_than=0)
         return found
 
     def __repr__(self) -> str:
@@ -142,6 +159,29 @@ class FreeSet(InSpace):
         found = np.empty(first.shape[:-1], bool)
         motions(self._cells, rows, ends, found.reshape(-1))
         return found
+
+    def nearest(self, q: ArrayLike, *, closer_than: float = np.inf, boxes: int = BOXES) -> Closest:
+        """Returns the configuration that is proved to be free and is nearest to q, (n,). q may be beyond the joint limits.
+
+        :meth:`contains` says of it that it is free, after rounding too. Distances are computed in floating point.
+
+        Args:
+            closer_than: only what is closer than this counts, in s.
+            boxes: the search ends after about this many boxes; with what it has found.
+
+        Raises:
+            RegionError: points; wrong_length, also for several configurations; outside_window, for a joint that is half a turn from q*.
+        """
+        from ciris.nearest import Aim, nearest
+
+        space, given = self.space, self.space.points(q, "q")
+        if given.ndim != 1:
+            raise RegionError("wrong_length", f"it has the shape {given.shape}", field="q", hint="ask about one configuration at a time")
+        if closer_than > 0 and self.contains(given):
+            return Closest(given, 0.0, True, 0)
+        aim, found = Aim(given, space.to_s(given), space.q_star, space.revolute), np.full(len(given), np.nan)
+        distance, looked, complete = nearest(self._cells, aim, float(closer_than), boxes, found)
+        return Closest(None, None, complete, looked) if np.isnan(found[0]) else Closest(found, distance, complete, looked)
 
     def open_parts(self, start: ArrayLike, end: ArrayLike) -> tuple[OpenPart, ...]:
         """Returns where a motion from one configuration straight to another, (n,) each, is not proved to be free, for each group of pairs.

@@ -107,12 +107,12 @@ def _leaf(nodes: NDArray[np.void], tolerance: Floats, root: int, x: Floats) -> t
         at = nodes[node]
         beyond = x[at.joint] - at.cut
         near = near | (abs(beyond) <= tolerance[at.joint])
-        node = at.upper if beyond > 0 else _lower(nodes, node)
+        node = at.upper if beyond > 0 else lower_part(nodes, node)
     return node, near
 
 
 @njit(cache=True)
-def _lower(nodes: NDArray[np.void], node: int) -> int:
+def lower_part(nodes: NDArray[np.void], node: int) -> int:
     """Returns the node of the lower part."""
     leaf = nodes[node].lower
     return leaf if leaf < 0 else node + 1
@@ -222,7 +222,7 @@ def _open_in_tree(
             j, v, upper = nodes[node].joint, nodes[node].cut, nodes[node].upper
             near = tolerance[j]
             if max(x[j], y[j]) < v - near:  # most cuts are far from all of the motion
-                node = _lower(nodes, node)
+                node = lower_part(nodes, node)
                 continue
             if min(x[j], y[j]) > v + near:
                 node = upper
@@ -231,10 +231,10 @@ def _open_in_tree(
             if way == 0.0:
                 waiting[top], spans[top, 0], spans[top, 1] = upper, a, b
                 top += 1
-                node = _lower(nodes, node)
+                node = lower_part(nodes, node)
                 continue
             enters, leaves = (v - near - x[j]) / way, (v + near - x[j]) / way
-            ahead, behind = _lower(nodes, node), upper  # The motion begins in the part ahead.
+            ahead, behind = lower_part(nodes, node), upper  # The motion begins in the part ahead.
             if way < 0:
                 enters, leaves, ahead, behind = leaves, enters, behind, ahead
             if leaves < a:

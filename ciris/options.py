@@ -184,6 +184,10 @@ class MapOptions(JobOptions, total=False):
     """(n,) or (k, n). Joint positions that the map is to cover first."""
     paths: Sequence[ArrayLike]
     """(k, n) each. Motions that the map is to cover first, straight in joint positions from waypoint to waypoint."""
+    asked: bool
+    """Cover next the configurations that the service was asked about lately and nothing proved; those in collision are left out. The
+    job's options have them in ``at``.
+    """
     random_seed: int
     """Seed of every random choice. Default: 0."""
 
@@ -193,6 +197,7 @@ MAP: Fields = {
     "coverage": ("options.coverage", "real"),
     "at": ("options.at", "points"),
     "paths": ("options.paths", "paths"),
+    "asked": ("options.asked", "flag"),
     "random_seed": ("options.random_seed", "whole"),
 }
 

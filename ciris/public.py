@@ -5,7 +5,7 @@ from certifier.outcome import Guarantee, Outcome
 from ciris.answers import Containment, Cover, Coverage, Event, Graph, Map, Motion, Nearest, Obstacle, Plan, Segments, Verification
 from ciris.asynchronous.service import AsyncJob, AsyncRegion, AsyncService
 from ciris.connecting import connect, connect_async
-from ciris.free_set import FreeSet, OpenPart
+from ciris.free_set import Closest, FreeSet, OpenPart
 from ciris.scene import Scene
 from ciris.space import Space
 from ciris.synchronous.service import Job, Region, Service
@@ -15,6 +15,7 @@ __all__ = [
     "AsyncRegion",
     "AsyncService",
     "CirisError",
+    "Closest",
     "Containment",
     "Cover",
     "Coverage",

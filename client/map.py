@@ -60,6 +60,8 @@ def _here(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
     given = enumerate(asked["options"].get("paths", []))
     paths = [[_wanted(scene, q, f"options.paths[{i}][{j}]") for j, q in enumerate(path)] for i, path in given]
     options = read(MapOptions, {**asked["options"], "at": at, "paths": paths}, "options")
+    if options.asked:
+        raise CirisError("option", "is only for jobs of the service", field="--asked", hint="leave out it or --local")
     from certifier.jobs.map import grow_map, in_s, ways_of
 
     former = None if args.former is None else _former(args.former)

@@ -1,4 +1,4 @@
-"""These commands are a planner's questions: for a motion, for the nearest region, whether a path stays in regions, how regions connect."""
+"""These commands are a planner's questions: for a motion, for what is proved near by, whether a path is proved, how regions connect."""
 
 from __future__ import annotations
 
@@ -41,13 +41,14 @@ def nearest(args: Namespace) -> int:
     points = [configuration(text) for text in args.q]
     with service.connect(args.url) as client:
         answer = client.nearest(service.scene_name(client, args.scene), points)
-    found = [point["nearest"] for point in answer["points"]]
     if args.json:
         print_json(answer)
     else:
-        for q, near in zip(points, found, strict=True):
-            print(f"{shown(q)}: {_near(near) if near else _no_region(answer)}")
-    return NO if None in found else OK
+        for q, point in zip(points, answer["points"], strict=True):
+            near = point["nearest"]
+            early = "" if point["complete"] else "; the search in the map ended early: a nearer point may be proved"
+            print(f"{shown(q)}: {_near(near) if near else _nothing_near(answer)}{early}")
+    return NO if any(point["nearest"] is None for point in answer["points"]) else OK
 
 
 def plan(args: Namespace) -> int:
@@ -267,9 +268,16 @@ def _proof_of(piece: dict[str, Any]) -> str:
 
 
 def _near(near: dict[str, Any]) -> str:
+    what = f"the map of job {near['map']}" if near["map"] else near["region"]
     if near["distance"] == 0:
-        return f"inside {near['region']} ({near['guarantee']})"
-    return f"{near['distance']:.3g} in s from {near['region']} ({near['guarantee']}), whose nearest point is {_place(near['q'])}"
+        return f"inside {what} ({near['guarantee']})"
+    return f"{near['distance']:.3g} in s from {what} ({near['guarantee']}), whose nearest point is {_place(near['q'])}"
+
+
+def _nothing_near(answer: dict[str, Any]) -> str:
+    if answer["regions"] == 0 and answer["map"] is None:
+        return "the scene has no regions and no map"
+    return "nothing was found, or a joint is outside its limits"
 
 
 def _advice(gap: dict[str, Any]) -> str:

@@ -519,6 +519,19 @@ class MotionRow(Owned, Base):
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
 
 
+class QuestionRow(Owned, Base):
+    """A configuration of a scene that somebody asked about, and that nothing proved then (db.questions)."""
+
+    __tablename__ = "questions"
+
+    scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"), primary_key=True)
+    digest: Mapped[str] = mapped_column(String(32), primary_key=True)
+    """Tells configurations apart."""
+    q: Mapped[list[float]] = mapped_column(JSON(none_as_null=True))
+    asked_at: Mapped[datetime]
+    """When somebody asked last."""
+
+
 class OverlapRow(Base):
     """Two regions of a scene overlap: a ball fits into both."""
 

@@ -23,6 +23,7 @@ from db.models import (
     PairRow,
     ProjectRow,
     ProofRow,
+    QuestionRow,
     RegionRow,
     SceneNameRow,
     SceneRow,
@@ -91,6 +92,7 @@ def delete_scene(session: Session, scene_id: str, *, dependents: bool) -> None:
     _check(found, found.jobs, f"scene {scene_id}", dependents)
     _delete_jobs(session, which)
     motions.delete_all(session, scene_id)
+    session.execute(delete(QuestionRow).where(QuestionRow.scene_id == scene_id))
     session.execute(delete(SceneNameRow).where(SceneNameRow.scene_id == scene_id))
     session.execute(delete(SceneRow).where(SceneRow.id == scene_id))
 
@@ -112,11 +114,13 @@ def delete_job(session: Session, job_id: str, *, dependents: bool) -> None:
 def expire(session: Session, now: datetime) -> int:
     """Deletes some of what has expired in the projects that keep things for a number of days. Returns how many jobs it was about.
 
-    A job without regions goes, once its webhook does not wait any more. Of one with regions, only these and its own row stay.
+    A job without regions goes, once its webhook does not wait any more. Of one with regions, only these and its own row stay. So do
+    configurations that somebody asked about.
     """
     done = 0
     for project in session.scalars(select(ProjectRow).where(projects.expires())):
         before = now - timedelta(days=project.keep_days or 0.0)
+        session.execute(delete(QuestionRow).where(QuestionRow.project == project.name, QuestionRow.asked_at < before))
         # A cover goes when all of its jobs may go.
         other = JobRow.__table__.alias()
         child = exists().where(other.c.parent_id == JobRow.id, or_(other.c.finished_at.is_(None), other.c.finished_at >= before))

@@ -191,6 +191,9 @@ class Settings(BaseSettings):
 
     kept_motions: int = Field(default=500, ge=0)
     """Number of proved motions of a scene that are kept to answer later questions. The oldest ones go."""
+    kept_questions: int = Field(default=0, ge=0, le=10_000)
+    """Number of configurations of a scene that are kept because somebody asked about them and nothing proved them, for maps to begin with.
+    With 0, nothing is kept."""
 
     @property
     def family(self) -> socket.AddressFamily:

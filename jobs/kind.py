@@ -104,6 +104,10 @@ class Kind:
         """
         raise NotImplementedError
 
+    def completed(self, options: dict[str, Any], scene_id: str, scene: Scene, db: Database) -> dict[str, Any]:
+        """Returns the options that a new job has, with what it takes from what the service knows at this time."""
+        return options
+
     def warnings(self, options: dict[str, Any], scene: Scene) -> list[str]:
         """Returns sentences about why a job with these options will probably be in vain, as far as that takes milliseconds."""
         return []

@@ -12,14 +12,15 @@ from sqlalchemy.orm import Session
 from certifier import stored
 from certifier.errors import CirisError
 from certifier.growth.actions import Finish
-from certifier.jobs.map import ways_of
+from certifier.jobs.map import in_s, ways_of
 from certifier.map.ends import ENDS
 from certifier.map.options import MapOptions
+from certifier.map.trees import Plan
 from certifier.model import Scene
 from certifier.names import MAX_NAME
 from certifier.options import read
 from certifier.outcome import Outcome
-from db import jobs, maps, steps
+from db import jobs, maps, questions, steps
 from db.models import JobRow
 from db.session import Database
 from db.states import ACCEPT, LEAD, PIECE, JobState
@@ -89,6 +90,10 @@ class Map(Kind):
         ways_of(scene, given["paths"])  # refuses waypoints that are whole turns away
         return {**asdict(read(MapOptions, given, "options")), "former": None if body.former is None else _former(body.former, db)}
 
+    def completed(self, options: dict[str, Any], scene_id: str, scene: Scene, db: Database) -> dict[str, Any]:
+        """Has the job begin with what was asked, if it is to: the configurations are in its options, so these say what the map is."""
+        return {**options, "at": [*options["at"], *_asked(scene_id, scene, db)], "asked": False} if options["asked"] else options
+
     def decide(self, turn: Turn) -> Lead | Finish:
         match turn.report:
             case CirisError() as error:
@@ -144,6 +149,13 @@ class Map(Kind):
             "map": None if found is None else found[0],
             "ended": _ended(session, job),
         }
+
+
+def _asked(scene_id: str, scene: Scene, db: Database) -> list[list[float]]:
+    """Returns the configurations that somebody asked about and nothing proved, without those in collision."""
+    with db.read() as session:
+        found = questions.latest(session, scene_id)
+    return [q for q, free in zip(found, Plan(scene).free(in_s(scene, found)), strict=True) if free]
 
 
 def _former(job_id: str, db: Database) -> str:

@@ -1,4 +1,4 @@
-"""This module finds the point of a polytope, of all regions, and of two regions, that is nearest. Distances are those of s.
+"""This module finds the point of a polytope, of all regions and a map, and of two regions, that is nearest. Distances are those of s.
 
 These are answers for planners and prove nothing: they are found in floating point.
 """
@@ -11,12 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from certifier.model import Array
+from certifier.model import Array, Scene
 from certifier.positions import check_magnitude
+from ciris.free_set import BOXES, FreeSet
 from planner.library import Library
 
 INWARDS = 1e-9
 """The nearest point lies this far behind every face, in s, so that rounding does not take it out of its region."""
+TOGETHER = 5 * BOXES
+"""The searches in the map for all points of one question look at this many boxes at most, in some seconds. Most points need a hundred."""
 _INFEASIBLE = 1e-10
 """The residual of a least distance program without a solution is 0; rounding leaves it below this."""
 _ROUNDS, _SETTLED = 200, 1e-6
@@ -25,17 +28,58 @@ _ROUNDS, _SETTLED = 200, 1e-6
 
 @dataclass(frozen=True)
 class Nearest:
-    """Names the region that is nearest to a point.
+    """Names what is nearest to a point: a region, or the map.
 
     Attributes:
-        region: the region's number in the library.
-        s: (n,) the nearest point of the region; the point itself where it is inside.
+        region: the region's number in the library; None for the map.
+        s: (n,) the nearest point; the point itself where it is inside.
         distance: from the point to that, in s; 0 where the point is inside.
     """
 
-    region: int
+    region: int | None
     s: Array
     distance: float
+
+
+@dataclass(frozen=True)
+class Proved:
+    """Says what is proved nearest to a point.
+
+    Attributes:
+        nearest: None where nothing is proved.
+        complete: whether nothing nearer is proved; False where the search in the map ended early.
+    """
+
+    nearest: Nearest | None
+    complete: bool
+
+
+def nearest_proved(library: Library, free: FreeSet | None, scene: Scene, points: Array) -> list[Proved]:
+    """Returns what is nearest to each of the points s, (k, n), of all regions and the map's free set; nothing for a row that is not finite.
+
+    All searches in the map look at TOGETHER boxes at most.
+
+    Args:
+        free: None where the scene has no map.
+
+    Raises:
+        RegionError: number_too_large.
+    """
+    left, found = TOGETHER, []
+    for s in points:
+        if not np.isfinite(s).all():
+            found.append(Proved(None, True))
+            continue
+        near = nearest(library, s)
+        if free is None or (near is not None and near.distance == 0):
+            found.append(Proved(near, True))
+            continue
+        closest = free.nearest(scene.to_q(s), closer_than=np.inf if near is None else near.distance, boxes=min(BOXES, left))
+        left -= closest.boxes
+        if closest.q is not None and closest.distance is not None:
+            near = Nearest(None, s if closest.distance == 0 else scene.to_s(closest.q), closest.distance)
+        found.append(Proved(near, closest.complete))
+    return found
 
 
 def nearest(library: Library, s: Array, without: Collection[int] = ()) -> Nearest | None:

@@ -34,6 +34,7 @@ from api.schemas.planning import (
     SegmentResponse,
 )
 from api.strict import StrictRoute
+from api.unanswered import KeptUnanswered, Unanswered
 from certifier.model import Array, Scene
 from certifier.motion.splines import Curve, curve
 from db.session import Database
@@ -41,7 +42,7 @@ from planner.library import Library
 from planner.membership import locate, to_s
 from planner.motion.path import follow
 from planner.motion.space import Space
-from planner.nearest import nearest
+from planner.nearest import nearest_proved
 from planner.tubes import Tubes
 
 router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ], route_class=StrictRoute)
@@ -49,7 +50,9 @@ router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ]
 
 @router.post("/contains")
 @asking(few=100)
-def contains(body: ContainsRequest, db: Db, libraries: KeptLibraries, motions: KeptMotions, free_sets: KeptFreeSets) -> ContainsResponse:
+def contains(
+    body: ContainsRequest, db: Db, libraries: KeptLibraries, motions: KeptMotions, free_sets: KeptFreeSets, unanswered: KeptUnanswered
+) -> ContainsResponse:
     """Returns what proves each point free: certified regions with how deep inside it is, tubes of proved motions, the latest map."""
     scene_id, scene, library = asked(db, libraries, body.scene)
     body = with_positions(db, scene, body)
@@ -68,25 +71,31 @@ def contains(body: ContainsRequest, db: Db, libraries: KeptLibraries, motions: K
         margin = hits[0].margin if hits else None
         containments.append(Containment(inside=bool(hits or inside or by_map), regions=hits, margin=margin, motions=inside, map=by_map))
     job = None if mapped is None else mapped.job
+    outside = ~np.array([point.inside for point in containments]) & np.isfinite(points).all(axis=1)
+    unanswered.note(db, scene_id, scene.in_windows(q[outside]))
     return ContainsResponse(scene=scene_id, version=library.version, regions=len(library), map=job, points=containments)
 
 
 @router.post("/nearest")
 @asking(few=50)
-def find_nearest(body: NearestRequest, db: Db, libraries: KeptLibraries) -> NearestResponse:
-    """Returns, for each point, the nearest certified region of the scene, its nearest point and how far that is."""
+def find_nearest(body: NearestRequest, db: Db, libraries: KeptLibraries, free_sets: KeptFreeSets) -> NearestResponse:
+    """Returns, for each point, the nearest point that a certified region or the scene's latest map proves free, and how far that is."""
     scene_id, scene, library = asked(db, libraries, body.scene)
     body = with_positions(db, scene, body)
     points = _points(scene, body.q, body.s)
-    found = [nearest(library, s) if np.isfinite(s).all() else None for s in points]
-    points_found = [NearestPoint(nearest=answers.near(library, scene, near)) for near in found]
-    return NearestResponse(scene=scene_id, version=library.version, regions=len(library), points=points_found)
+    mapped = free_sets.of(db, scene_id)
+    free, job = (None, None) if mapped is None else (mapped.free, mapped.job)
+    found = [
+        NearestPoint(nearest=answers.near(library, scene, proved.nearest, job), complete=proved.complete)
+        for proved in nearest_proved(library, free, scene, points)
+    ]
+    return NearestResponse(scene=scene_id, version=library.version, regions=len(library), map=job, points=found)
 
 
 @router.post("/segment")
 @asking(few=20)
 def cover_segments(
-    body: SegmentRequest, db: Db, libraries: KeptLibraries, motions: KeptMotions, free_sets: KeptFreeSets
+    body: SegmentRequest, db: Db, libraries: KeptLibraries, motions: KeptMotions, free_sets: KeptFreeSets, unanswered: KeptUnanswered
 ) -> SegmentResponse:
     """Says of each straight motion whether every point of it is proved to be free, and what proves it.
 
@@ -102,12 +111,15 @@ def cover_segments(
         _covering(*proofs, scene, body.space, _waypoints(scene, body.space, ends, f"{name}[{i}]", name), [0.0, 1.0])
         for i, ends in enumerate(given)
     ]
+    _note(unanswered, db, scene_id, scene, segments)
     return SegmentResponse(scene=scene_id, version=library.version, regions=len(library), segments=segments)
 
 
 @router.post("/path")
 @asking(few=20)
-def cover_path(body: PathRequest, db: Db, libraries: KeptLibraries, motions: KeptMotions, free_sets: KeptFreeSets) -> PathResponse:
+def cover_path(
+    body: PathRequest, db: Db, libraries: KeptLibraries, motions: KeptMotions, free_sets: KeptFreeSets, unanswered: KeptUnanswered
+) -> PathResponse:
     """Says whether every point of a path, straight between its waypoints or along a curve, is proved to be free, and what proves it.
 
     With `times` the path is a trajectory, and the answer is in its times. What `covered` means is said at `/v1/planning/segment`.
@@ -118,6 +130,7 @@ def cover_path(body: PathRequest, db: Db, libraries: KeptLibraries, motions: Kep
     times = body.times or (np.arange(len(found.controls) // found.degree + 1.0) if found.times is None else found.times).tolist()
     proofs = library, motions.of(db, scene_id, scene).tubes, free_sets.of(db, scene_id)
     answer = _covering(*proofs, scene, body.space, found.controls, times, found.degree)
+    _note(unanswered, db, scene_id, scene, [answer])
     return PathResponse(scene=scene_id, version=library.version, regions=len(library), **dict(answer))
 
 
@@ -143,6 +156,12 @@ async def get_graph(
 def _graph(db: Database, libraries: Libraries, free_sets: FreeSetsKept, name: str) -> GraphResponse:
     scene_id, scene, library = asked(db, libraries, name)
     return graph.describe(db, free_sets.of(db, scene_id), scene_id, scene, library)
+
+
+def _note(unanswered: Unanswered, db: Database, scene_id: str, scene: Scene, found: Sequence[Covering]) -> None:
+    """Notes where motions stop being covered, within the joint limits."""
+    stops = [stop.uncovered.q for stop in found if stop.uncovered is not None and stop.uncovered.s is not None]
+    unanswered.note(db, scene_id, scene.in_windows(np.array(stops).reshape(-1, scene.n)))
 
 
 def _points(scene: Scene, q: Sequence[Sequence[float]] | None, s: Sequence[Sequence[float]] | None) -> Array:

@@ -16,6 +16,7 @@ from api.motions import KeptMotions
 from api.schemas.planning import MOTION
 from api.schemas.plans import PlanRequest, PlanResponse
 from api.strict import StrictRoute
+from api.unanswered import KeptUnanswered
 from certifier.proof.container import with_scene
 from db import motions, proofs, scenes
 
@@ -24,14 +25,14 @@ router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ]
 
 @router.post("/plan")
 async def plan_trajectory(
-    body: PlanRequest, db: Db, libraries: KeptLibraries, links: KeptLinks, kept: KeptMotions, children: Children
+    body: PlanRequest, db: Db, libraries: KeptLibraries, links: KeptLinks, kept: KeptMotions, unanswered: KeptUnanswered, children: Children
 ) -> PlanResponse:
     """Returns a motion from rest to rest that is proved to be free of collision, or why there is none.
 
     It is straight in `q` between the configurations of the answer. The service takes it from what is proved already, if it can: an earlier
     motion, or the certified regions. Otherwise it searches for a motion and proves it. The pieces name what proves the motion.
     """
-    return await children.run(plan.answer, plan.Asked(db, libraries, links, kept), body)
+    return await children.run(plan.answer, plan.Asked(db, libraries, links, kept, unanswered), body)
 
 
 @router.get("/motions/{motion_id}/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})

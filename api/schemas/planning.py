@@ -197,10 +197,11 @@ class ContainsResponse(Answer):
 
 
 class Near(BaseModel):
-    """Names a region near a point. The nearest point is found in floating point and lies 1e-9 behind every face, in s."""
+    """Names a region near a point, or the map. The nearest point is found in floating point. It lies 1e-9 behind every face, in s."""
 
-    region: RegionId
-    guarantee: Guarantee = Field(description="What the region's certificate is worth.", examples=["exact"])
+    region: RegionId | None = Field(description="The region; null for the map.", examples=[REGION])
+    map: MapJob | None = Field(default=None, description="The job that has grown the map; null for a region.", examples=[MAP])
+    guarantee: Guarantee = Field(description="What the certificate is worth.", examples=["exact"])
     distance: Distance
     q: Q
     s: S
@@ -210,14 +211,19 @@ class NearestPoint(BaseModel):
     """Answers for one point."""
 
     nearest: Near | None = Field(
-        description="The nearest region and its nearest point, distance 0 where the region contains the point; null where the scene has no "
-        "region, or a joint is outside its limits."
+        description="The nearest point that a region or the scene's latest map proves free, distance 0 where it is the point itself; null "
+        "where nothing was found, or a joint is outside its limits."
+    )
+    complete: bool = Field(
+        description="False where the search in the map ended early, after much work: the map may prove a point that is nearer.",
+        examples=[True],
     )
 
 
 class NearestResponse(Answer):
     """Holds one answer for each point, in order."""
 
+    map: MapJob | None = Field(description="The job that has grown the scene's latest map; null where the scene has none.")
     points: list[NearestPoint] = Field(description="One answer for each point, in order.")
 
 

@@ -16,4 +16,9 @@ class MapOptions:
     paths: tuple[tuple[tuple[float, ...], ...], ...] = option(
         (), "Motions that the map is to cover first, straight in joint positions from waypoint to waypoint.", argument="path", most=10_000
     )
+    asked: bool = option(
+        False,
+        "Cover next the configurations that the service was asked about lately and nothing proved; those in collision are left out. The "
+        "job's options have them in `at`.",
+    )
     random_seed: int = option(0, "Seed of every random choice.", least=0, greatest=2**63 - 1)

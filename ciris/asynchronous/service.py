@@ -345,9 +345,9 @@ class AsyncService:
         return Containment([read(Contained, point) for point in answer["points"]], answer["version"], answer["regions"])
 
     async def nearest(self, scene: str | Scene, q: ArrayLike | None = None, *, s: ArrayLike | None = None) -> Nearest:
-        """Returns the region of a scene that is nearest to each point, given as q, by names of configurations, or as s, (n,) or (k, n)."""
+        """Returns the nearest point that a region or the latest map of a scene proves free. Points are given as for :meth:`contains`."""
         answer = await self.client.nearest(scene_name(scene), **points(2, q=q, s=s))
-        found = [point["nearest"] and read(Near, point["nearest"]) for point in answer["points"]]
+        found = [point["nearest"] and read(Near, point | point["nearest"]) for point in answer["points"]]
         return Nearest(found, answer["version"], answer["regions"])
 
     async def segments(

@@ -407,7 +407,7 @@ class Client:
         return self._json("POST", "/v1/planning/certify-path", json=request)
 
     def nearest(self, scene: str, q: Rows | None = None, s: Rows | None = None) -> Document:
-        """Returns the region of a scene that is nearest to each of these points, with its nearest point and distance."""
+        """Returns the nearest point that a region or the latest map of a scene proves free, for each of these points, and its distance."""
         return self._json("POST", "/v1/planning/nearest", json={"scene": scene, **given(q=q, s=s)})
 
     def segments(self, scene: str, q: list[Rows] | None = None, space: str = "q", s: list[Rows] | None = None) -> Document:

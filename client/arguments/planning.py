@@ -39,7 +39,7 @@ def add(verbs: Any) -> None:
 
     for verb, run, help_text in (
         ("contains", "client.commands:contains", "show which certified regions contain a configuration"),
-        ("nearest", "client.planning:nearest", "show which certified region is nearest to a configuration, and how far it is"),
+        ("nearest", "client.planning:nearest", "show what is proved nearest to a configuration, by a region or the map, and how far it is"),
     ):
         about_points = verbs.add_parser(verb, parents=[remote(), as_json()], help=help_text)
         about_points.add_argument("scene", metavar="SCENE", help=SCENE)

@@ -20,7 +20,7 @@ from db import jobs, overlaps, regions
 from db.models import StepRow
 from db.session import Database
 from db.states import ACCEPT, StepState
-from planner import overlap
+from planner import nearest, overlap
 from tests.api.conftest import BASE_URL, store_region
 from tests.certifier.scenes import accepted
 from tests.db.builders import a_running_job, add_region
@@ -58,11 +58,41 @@ def test_nearest_names_the_nearest_region_and_its_nearest_point(client: TestClie
     answer = client.post("/v1/planning/nearest", json={"scene": "slider", "q": [[0.1], [0.9], [5.0]]}).json()
     inside, outside, beyond = (point["nearest"] for point in answer["points"])
     assert (answer["version"], answer["regions"]) == (1, 1)
-    assert inside == {"region": region, "guarantee": "exact", "distance": 0.0, "q": [0.1], "s": [0.1]}
+    assert inside == {"region": region, "map": None, "guarantee": "exact", "distance": 0.0, "q": [0.1], "s": [0.1]}
     assert (outside["region"], outside["distance"]) == (region, pytest.approx(0.7))
     assert outside["q"] == outside["s"] == [pytest.approx(0.2)]
     assert client.post("/v1/planning/contains", json={"scene": "slider", "q": [outside["q"]]}).json()["points"][0]["inside"]
     assert beyond is None, "5 m is beyond the joint's limits"
+
+
+def test_nearest_names_the_map_where_it_is_nearer_than_all_regions(
+    client: TestClient, region: str, scene: Scene, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = {"scene": "slider", "q": [[0.1], [0.45], [0.5], [0.9], [5.0]]}
+    before = client.post("/v1/planning/nearest", json=asked).json()
+    assert (before["map"], {point["complete"] for point in before["points"]}) == (None, {True})
+    job = store_map(database, blocked(scene), region)
+    after = client.post("/v1/planning/nearest", json=asked).json()
+    assert (after["map"], {point["complete"] for point in after["points"]}) == (job, {True})
+    in_region, before_post, at_post, in_map, beyond = (point["nearest"] for point in after["points"])
+    assert (in_region["region"], in_region["map"], in_region["distance"], beyond) == (region, None, 0.0, None)
+    assert in_map == {"region": None, "map": job, "guarantee": "exact", "distance": 0.0, "q": [0.9], "s": [0.9]}
+    for q, near in ((0.45, before_post), (0.5, at_post)):
+        assert (near["region"], near["map"]) == (None, job)
+        assert near["distance"] == pytest.approx(abs(near["q"][0] - q))
+        assert 0 < near["distance"] < q - 0.2, "the region ends at 0.2"
+        for space in ("q", "s"):
+            body = {"scene": "slider", space: [near[space]]}
+            (point,) = client.post("/v1/planning/contains", json=body).json()["points"]
+            assert (point["map"], point["regions"]) == (True, [])
+    in_s = client.post("/v1/planning/nearest", json={"scene": "slider", "s": [[0.5], [3.0]]}).json()["points"]
+    assert in_s[0]["nearest"] == at_post
+    assert in_s[1]["nearest"]["distance"] == pytest.approx(2.0), "the joint ends at 1 m"
+
+    monkeypatch.setattr(nearest, "TOGETHER", 1)
+    first, second = client.post("/v1/planning/nearest", json=asked | {"q": [[0.5], [0.5]]}).json()["points"]
+    assert (first["complete"], second["complete"]) == (False, False)
+    assert second["nearest"]["region"] == region, "the regions are looked at nonetheless"
 
 
 @pytest.mark.parametrize("space", ["q", "s"])
@@ -182,19 +212,23 @@ def test_a_gap_that_the_latest_map_proves_says_so(client: TestClient, region: st
     far = store_region(database, a_part(0.6, 0.9))
     before = client.get("/v1/planning/graph?scene=slider").json()
     assert (before["map"], [gap["map"] for gap in before["gaps"]]) == (None, [False])
-    with database.write() as session:
-        scene_id = regions.get(session, far).scene_id
     for proves in (True, False):  # the second map, which is the latest then, is that of a scene with a post in the gap
-        free = free_set(grow_map(scene if proves else blocked(scene), 1.0, deadline_s=10.0).proof)
-        with database.write() as session:
-            job, _ = jobs.create(session, kind="map", scene_id=scene_id, options={})
-            session.add(StepRow(job_id=job.id, turn=1, input={}, kind=ACCEPT, state=StepState.DONE, report={}, data=as_file(free)))
+        job = store_map(database, scene if proves else blocked(scene), far)
         found = client.get("/v1/planning/graph?scene=slider").json()
         (gap,) = found["gaps"]
-        assert (found["map"], gap["map"]) == (job.id, proves)
+        assert (found["map"], gap["map"]) == (job, proves)
         motion = {"scene": "slider", "q": [[gap["q_a"], gap["q_b"]]]}
         (covering,) = client.post("/v1/planning/segment", json=motion).json()["segments"]
         assert covering["covered"] == proves
+
+
+def store_map(database: Database, mapped: Scene, region: str) -> str:
+    """Stores the map of a scene as that of a region's scene, and returns the id of its job."""
+    free = free_set(grow_map(mapped, 1.0, deadline_s=10.0).proof)
+    with database.write() as session:
+        job, _ = jobs.create(session, kind="map", scene_id=regions.get(session, region).scene_id, options={})
+        session.add(StepRow(job_id=job.id, turn=1, input={}, kind=ACCEPT, state=StepState.DONE, report={}, data=as_file(free)))
+        return job.id
 
 
 def blocked(scene: Scene) -> Scene:

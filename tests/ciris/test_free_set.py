@@ -195,6 +195,73 @@ def test_a_motion_may_cross_many_cells(tmp_path: Path) -> None:
         assert sum(part.end - part.start for part in parts) == pytest.approx(100 * (cuts[1] - cuts[0]) / 4, abs=1e-6)
 
 
+def nearest_free(cells: list[list[list[Leaf]]], found: FreeSet, q: np.ndarray) -> float:
+    """The distance in s from q to the nearest cell of all trees that is free; boundaries between cells are looked at as well."""
+    s, least = found.to_s(q), np.inf
+    ends = [
+        sorted({float(x) for members in cells for boxes in members for low, high, _ in boxes for x in (low[j], high[j])}) for j in range(N)
+    ]
+    # Between two neighbouring ends, all configurations have the same answer.
+    for slab in itertools.product(*(itertools.pairwise(each) for each in ends)):
+        low, high = np.array(slab).T
+        if free_at(cells, [Fraction(x) for x in ((low + high) / 2).tolist()]):
+            least = min(least, float(np.linalg.norm(found.to_s(np.clip(q, low, high)) - s)))
+    return least
+
+
+@settings(deadline=None, max_examples=300)
+@given(clauses, st.lists(grids(20), min_size=1, max_size=4), st.sampled_from([np.inf, 1.0, 0.3]))
+def test_the_nearest_is_free_and_nothing_free_is_nearer(tmp_path_factory, drawn, configurations, closer_than) -> None:
+    lower, upper = [-LIMIT] * N, [LIMIT] * N
+    wanted = [[within(tree, lower, upper) for tree in members] for members in drawn]
+    found = FreeSet.load(written(tmp_path_factory.mktemp("free") / "cell.npz", wanted))
+    cells = [[leaves(tree, [Fraction(-2)] * N, [Fraction(2)] * N) for tree in members] for members in wanted]
+    for q in np.array(configurations):
+        closest, expected = found.nearest(q, closer_than=closer_than), nearest_free(cells, found, q)
+        assert closest.complete
+        if closest.q is None:
+            assert closest.distance is None
+            assert expected >= closer_than - 1e-7
+        else:
+            assert found.contains(closest.q)
+            assert found.contains(found.to_q(found.to_s(closest.q)))
+            assert closest.distance < closer_than
+            assert closest.distance == pytest.approx(np.linalg.norm(found.to_s(closest.q) - found.to_s(q)), rel=1e-12)
+            assert closest.distance == pytest.approx(expected, abs=1e-7)
+            assert closest.distance > 0 or (closest.q == q).all()
+
+
+def grown(rng: np.random.Generator, lower: np.ndarray, upper: np.ndarray, depth: int) -> Any:
+    """A tree with random cuts, two fifths of whose cells are open."""
+    if depth == 0:
+        return OPEN if rng.random() < 0.4 else PROVED
+    joint = int(rng.integers(N))
+    cut = rng.uniform(lower[joint], upper[joint])
+    on = np.arange(N) == joint
+    return joint, cut, grown(rng, lower, np.where(on, cut, upper), depth - 1), grown(rng, np.where(on, cut, lower), upper, depth - 1)
+
+
+def test_the_nearest_of_thousands_of_cells_is_free_and_no_sample_is_nearer(tmp_path: Path) -> None:
+    rng, limits = np.random.default_rng(0), np.full(N, LIMIT)
+    clauses = [[grown(rng, -limits, limits, 9) for _ in range(count)] for count in (1, 1, 1, 1, 2, 1)]
+    found = FreeSet.load(written(tmp_path / "cell.npz", clauses))
+    q = rng.uniform(-LIMIT, LIMIT, (100_000, N))
+    s = found.to_s(q[found.contains(q)])
+    assert 0.02 < len(s) / len(q) < 0.2
+    asked = rng.uniform(-1.2 * LIMIT, 1.2 * LIMIT, (200, N))
+    closest = [found.nearest(each) for each in asked]
+    for each, near in zip(asked, closest, strict=True):
+        assert near.complete
+        assert found.contains(near.q)
+        assert near.distance <= np.linalg.norm(s - found.to_s(each), axis=1).min()
+    hard = int(np.argmax([near.boxes for near in closest]))
+    assert closest[hard].boxes > 50
+    early = found.nearest(asked[hard], boxes=20)
+    assert not early.complete
+    assert found.contains(early.q)
+    assert early.distance >= closest[hard].distance
+
+
 def test_bad_questions_are_named(tmp_path: Path) -> None:
     found = FreeSet.load(written(tmp_path / "cell.npz", [[PROVED]]))
     for ask, code in (
@@ -202,6 +269,8 @@ def test_bad_questions_are_named(tmp_path: Path) -> None:
         (lambda: found.contains([0, np.nan, 0]), "points"),
         (lambda: found.contains_motion([[0, 0, 0]], [0, 0, 0]), "motion"),
         (lambda: found.open_parts([[0, 0, 0]], [[0, 0, 0]]), "motion"),
+        (lambda: found.nearest([[0, 0, 0]]), "wrong_length"),
+        (lambda: found.nearest([0, 0, 4]), "outside_window"),
     ):
         with pytest.raises(RegionError) as error:
             ask()

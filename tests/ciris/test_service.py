@@ -145,6 +145,7 @@ def test_what_is_near_has_a_place_and_a_distance(service: Any, region: str) -> N
     assert np.isnan(answer.distance[2])
     assert inside.region == outside.region == region
     assert outside.q == pytest.approx([0.2])
+    assert (outside.map, outside.complete) == (None, True)
     assert beyond is None
 
 

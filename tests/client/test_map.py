@@ -72,6 +72,11 @@ def test_a_former_map_is_gone_on_with(ciris: Ciris, tmp_path: Path) -> None:
         assert (done.status, words in done.error) == (2, True), done.error
 
 
+def test_what_was_asked_is_known_to_the_service_alone(ciris: Ciris) -> None:
+    done = ciris("map", PLANAR, "--local", "--asked")
+    assert (done.status, done.stderr) == (2, "error: --asked: is only for jobs of the service (leave out it or --local)\n")
+
+
 def test_a_former_map_that_changes_meanwhile_is_refused(ciris: Ciris, monkeypatch: pytest.MonkeyPatch) -> None:
     """The error is a ``proof_malformed``."""
     ciris("map", PLANAR, "--local", "--coverage", "0.5", "--out", "first.proof")

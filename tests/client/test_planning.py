@@ -30,7 +30,7 @@ def test_nearest_says_how_far_the_nearest_region_is(ciris: Ciris, url: str, regi
 
 def test_nearest_without_a_region_is_a_negative_answer(ciris: Ciris, url: str, scene: Scene) -> None:
     done = ciris("nearest", "slider", "--q", "0.1", CIRIS_URL=url)
-    assert (done.status, done.stdout) == (1, "0.1: the scene has no regions\n")
+    assert (done.status, done.stdout) == (1, "0.1: the scene has no regions and no map\n")
 
 
 def test_a_path_is_answered_by_the_exit_status(ciris: Ciris, url: str, region: str, database: Database, tmp_path: Path) -> None:

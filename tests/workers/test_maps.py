@@ -143,6 +143,10 @@ def test_questions_are_answered_by_the_latest_map(client: TestClient, planar: Sc
     assert [point["map"] for point in after["points"]] == proved.tolist()
     assert not (proved & collides).any()
     assert proved[~collides].mean() > 0.9
+    near = [point["nearest"] for point in ask("nearest", q=q.tolist())["points"]]
+    assert {(point["region"], point["map"]) for point in near} == {(None, job_id)}
+    assert [point["distance"] == 0 for point in near] == proved.tolist()
+    assert all(point["inside"] for point in ask("contains", q=[point["q"] for point in near])["points"])
     free = np.flatnonzero(proved)[:200].reshape(-1, 2)
     answers = ask("segment", q=q[free].tolist())["segments"]
     covered = np.array([answer["covered"] for answer in answers])

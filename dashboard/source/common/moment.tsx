@@ -1,4 +1,4 @@
-// What is known of one configuration: what touches there, which regions, motions and map prove it, and which region is nearest. An
+// What is known of one configuration: what touches there, which regions, motions and map prove it, and what is proved nearest. An
 // answer counts for the configuration that it was asked for, and for no other.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { post, said } from "./api";
@@ -31,7 +31,7 @@ async function ask(scene: string, q: number[]): Promise<Moment> {
   const { inside, motions, map } = containing.points[0]!;
   const regions = containing.points[0]!.regions.map(({ region }) => region);
   let nearest: Moment["nearest"] = null;
-  if (!inside && containing.regions > 0 && outside.length === 0) {
+  if (!inside && (containing.regions > 0 || containing.map) && outside.length === 0) {
     nearest = (await post<NearestResponse>("/v1/planning/nearest", body)).points[0]!.nearest;
   }
   return { pairs, trouble, regions, motions, map: map ? containing.map : null, nearest, problem: null };
@@ -92,7 +92,7 @@ export function MomentText({ moment }: { moment: Moment }) {
       ) : map ? (
         <span class="proved">In proved cells of the <a href={`/jobs/${map}`}>map</a>. No collision of the scene's pairs, as proved.</span>
       ) : (
-        <span><span class="computed">No collision (computed, not proved)</span>, and in no certified region{nearest && <>; the nearest is <a href={`/regions/${nearest.region}`}>{nearest.region.slice(0, 8)}</a>, {nearest.distance.toPrecision(3)} away in s</>}.</span>
+        <span><span class="computed">No collision (computed, not proved)</span>, and in no certified region{nearest && <>; the nearest is {nearest.region ? <a href={`/regions/${nearest.region}`}>{nearest.region.slice(0, 8)}</a> : <>in the <a href={`/jobs/${nearest.map}`}>map</a></>}, {nearest.distance.toPrecision(3)} away in s</>}.</span>
       )}
     </p>
   );
