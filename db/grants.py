@@ -68,7 +68,7 @@ def add(session: Session, project: str, kind: Kind, name: str, scope: Scope) -> 
 
 
 def revoke(session: Session, project: str, kind: Kind, name: str) -> None:
-    """Withdraws a grant. A running API refuses within a second whoever works by it.
+    """Withdraws a grant. Within a second a running API refuses those who work by it.
 
     Raises:
         CirisError: project_not_found, grant_not_found.

@@ -14,7 +14,7 @@ from db.models import QuestionRow, SceneRow
 from db.session import inserting
 
 DIGITS = 6
-"""Configurations that are the same to this many digits after the point count as one."""
+"""Configurations that are the same to this many digits after the point share one row."""
 
 
 def note(session: Session, scene_id: str, asked: Array, most: int, now: datetime) -> None:

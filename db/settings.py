@@ -179,7 +179,7 @@ class Settings(BaseSettings):
     """One project may have this many API keys. Those that were revoked within the last day count."""
 
     session_hours: float = Field(default=12.0, gt=0, le=24 * 90)
-    """Whoever has signed in on the pages has to sign in again after this many hours."""
+    """People who signed in on the pages have to sign in again after this many hours."""
     oidc_issuer: Annotated[str, AfterValidator(_issuer)] = ""
     """URL of the OpenID Connect provider where people sign in, as its tokens name it; empty: people sign in with API keys only."""
     oidc_client_id: Annotated[str, AfterValidator(_with_issuer)] = Field(default="", validate_default=True)

@@ -17,7 +17,7 @@ from typing import Any
 NURSERY_S = 60.0
 """A process that solves takes work when it has what makes proposals, or after this many seconds."""
 SPARE = 1
-"""A solve worker has so many processes more, which do pieces of new jobs while the others work (workers.spare)."""
+"""A solve worker has this many processes more, which do pieces of new jobs while the others work (workers.spare)."""
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 

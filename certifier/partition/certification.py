@@ -55,7 +55,7 @@ AROUND = 0.1
 LOOKS_AGAIN = 8
 """Where cells stay open, this many searches for a contact follow the first one; one search misses contacts in a small corner."""
 LOOKING = 3
-"""So many parts of a round look for contacts in all of the polytope, each elsewhere."""
+"""At most this many parts of a round look for contacts in all of the polytope, each elsewhere."""
 MOST_POINTS = 2000
 """A result names at most this many configurations."""
 

@@ -64,7 +64,8 @@ def test_no_secret_has_a_default() -> None:
     text = (ROOT / "docker-compose.yml").read_text()
     secrets = re.findall(r"\$\{(\w*(?:PASSWORD|SECRET|KEY)\w*)(:.)?", text)
     assert secrets
-    assert {operator for _, operator in secrets} == {":?"}, "whoever starts it without one is told so"
+    # Without an identity provider there is none of this.
+    assert {operator for name, operator in secrets if name != "CIRIS_OIDC_CLIENT_SECRET"} == {":?"}, "whoever starts it without one is told so"
 
 
 def test_no_container_is_the_only_one_of_its_kind() -> None:
