@@ -6,6 +6,7 @@ import asyncio
 import hashlib
 import logging
 import math
+import shlex
 import time
 from collections.abc import Awaitable
 from concurrent.futures import ThreadPoolExecutor
@@ -291,7 +292,8 @@ class _Needs(HTTPBearer):
         caller: Caller = request.state.caller
         if not caller.scope.includes(self._scope):
             who = f"the key {caller.name!r}" if caller.subject is None else f"{caller.name!r}"
-            makes = "key add NAME" if caller.subject is None else f"project grant {caller.project} --person {caller.name}"
+            whom = "PERSON" if caller.name == caller.subject and "@" in caller.name else shlex.quote(caller.name)
+            makes = "key add NAME" if caller.subject is None else f"project grant {caller.project} --person {whom}"
             problem = f"this needs a key of the scope {self._scope}; {who} has {caller.scope}"
             raise CirisError("scope_missing", problem, field="Authorization", hint=f"`ciris {makes} --scope {self._scope}` makes one")
         return caller

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hmac
 import re
+import shlex
 from http import HTTPStatus
 from typing import Annotated, Any
 from urllib.parse import quote
@@ -96,7 +97,8 @@ async def project_page(request: Request, db: WholeDb, next: str = "/") -> Respon
     choices = await run_in_threadpool(_choices, db, found.person)
     if len(choices) == 1 and found.project is None:
         return await _into(request, db, next, choices[0][0])
-    context = {"person": found.person, "choices": choices, "chosen": found.project and found.project[0], "next": _local(next)}
+    chosen = found.project and found.project[0]
+    context = {"person": found.person, "choices": choices, "chosen": chosen, "next": _local(next), "grant": _grant(found.person)}
     return page(request, "choose_project.html", context, HTTPStatus.OK if choices else HTTPStatus.FORBIDDEN)
 
 
@@ -123,7 +125,9 @@ def _login(request: Request, next: str, *, wrong: bool = False) -> Response:
 
 async def _into(request: Request, db: Database, next: str, project: str) -> Response:
     """Makes a project the one that the session works in. Without a grant there, the page for choosing says which there are."""
-    token = await _choose(db, session_of(request.headers) or "", project)
+    given = session_of(request.headers)
+    known = given is not None and await run_in_threadpool(_signed_in, db, request) is not None
+    token = await _choose(db, given, project) if given is not None and known else None
     response = RedirectResponse(_choice(next) if token is None else _local(next), HTTPStatus.SEE_OTHER)
     if token is not None:
         _keep(request, response, token)
@@ -132,7 +136,10 @@ async def _into(request: Request, db: Database, next: str, project: str) -> Resp
 
 @writing
 def _begin(db: Database, who: Key | Person, before: str | None) -> str:
-    """Begins a session and ends the one that the browser had, and returns the new token."""
+    """Begins a session and ends the one of this token, which the browser had, and returns the new token.
+
+    At the way back from the provider the browser does not send its token; that session ends when it expires.
+    """
     with db.write() as session:
         if before is not None:
             sessions.end(session, before)
@@ -169,6 +176,13 @@ def _choices(db: Database, person: Person) -> list[tuple[str, str]]:
     """Returns the projects that a person may choose from, each with the scope there."""
     with db.read() as session:
         return [(row.project, row.scope) for row in grants.of_person(session, person)]
+
+
+def _grant(person: Person) -> str | None:
+    """Returns the command that lets a person in; None where it would name an address that may be somebody else's."""
+    if person.email is None and "@" in person.subject:
+        return None
+    return f"ciris project grant PROJECT --person {shlex.quote(person.name)} --scope read"
 
 
 def _callback(request: Request) -> str:

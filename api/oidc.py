@@ -162,7 +162,9 @@ class Provider:
             raise SignInRefused("the identity provider sent no ID token")
         claims = await self._believed(token, attempt)
         if not {"email", "email_verified", self._groups_claim} <= claims.keys() and "userinfo_endpoint" in provided.endpoints:
-            claims = await self._userinfo(provided, answer.get("access_token"), claims["sub"]) | claims
+            info = await self._userinfo(provided, answer.get("access_token"), claims["sub"])
+            of_address = claims if {"email", "email_verified"} <= claims.keys() else info  # both are of one document
+            claims = info | claims | {name: of_address.get(name) for name in ("email", "email_verified")}
         return self._described(claims)
 
     async def _believed(self, token: str, attempt: Attempt) -> dict[str, Any]:
@@ -194,8 +196,8 @@ class Provider:
 
     def _described(self, claims: dict[str, Any]) -> Person:
         email, verified, groups = claims.get("email"), claims.get("email_verified"), claims.get(self._groups_claim)
-        usable = verified in (True, "true") and isinstance(email, str) and "@" in email and _is_name(email)
-        named = [group for group in groups if isinstance(group, str)][:MOST_GROUPS] if isinstance(groups, list) else []
+        usable = verified in (True, "true") and isinstance(email, str) and "@" in email and email.isascii() and _is_name(email)
+        named = [group for group in groups if isinstance(group, str) and _is_name(group)][:MOST_GROUPS] if isinstance(groups, list) else []
         return Person(claims["sub"], str(email).lower() if usable else None, tuple(named))
 
     async def _ask(self, *, newer: bool = False) -> _Provided:
@@ -264,7 +266,7 @@ class Provider:
             raise ProviderUnavailable(self.host, f"it does not answer ({type(error).__name__})") from None
         try:
             document = json.loads(body)
-        except ValueError:
+        except (ValueError, RecursionError):
             document = None
         if isinstance(document, dict):
             return response.status_code, document

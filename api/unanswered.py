@@ -59,6 +59,8 @@ class Unanswered:
                     questions.note(session, scene_id, q, settings().kept_questions, utcnow())
             except (CirisError, *UNAVAILABLE) as error:
                 log.warning("what was asked about scene %s could not be noted: %s", scene_id, error)
+            except Exception:  # those of other scenes are noted all the same
+                log.exception("what was asked about scene %s could not be noted", scene_id)
 
 
 async def _unanswered(request: Request) -> Unanswered:

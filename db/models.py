@@ -173,6 +173,8 @@ class SessionRow(Base):
     key_id: Mapped[str | None] = mapped_column(ForeignKey("api_keys.id", ondelete="CASCADE"))
     subject: Mapped[str | None]
     """The person's name for programs, as the identity provider says it; None in a session of a key."""
+    issuer: Mapped[str | None]
+    """The identity provider that said so. Once the service has another one, the session lets nobody in."""
     email: Mapped[str | None]
     """The person's e-mail address in small letters, if the provider has verified it."""
     groups: Mapped[list[str]] = mapped_column(default=list)
@@ -523,6 +525,7 @@ class QuestionRow(Owned, Base):
     """A configuration of a scene that somebody asked about, and that nothing proved then (db.questions)."""
 
     __tablename__ = "questions"
+    __table_args__ = (Index(None, "project", "asked_at"),)
 
     scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"), primary_key=True)
     digest: Mapped[str] = mapped_column(String(32), primary_key=True)

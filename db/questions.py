@@ -19,7 +19,7 @@ DIGITS = 6
 
 def note(session: Session, scene_id: str, asked: Array, most: int, now: datetime) -> None:
     """Keeps configurations q, (k, n), of a scene. Of those that it has then, the ``most`` that were asked about last stay."""
-    project = session.scalar(select(SceneRow.project).where(SceneRow.id == scene_id).with_for_update())
+    project = session.scalar(select(SceneRow.project).where(SceneRow.id == scene_id).with_for_update(key_share=True))
     if project is None:  # the scene was deleted meanwhile
         return
     digests = {_digest(q): q.tolist() for q in asked[-most:]}

@@ -114,8 +114,8 @@ def delete_job(session: Session, job_id: str, *, dependents: bool) -> None:
 def expire(session: Session, now: datetime) -> int:
     """Deletes some of what has expired in the projects that keep things for a number of days. Returns how many jobs it was about.
 
-    A job without regions goes, once its webhook does not wait any more. Of one with regions, only these and its own row stay. So do
-    configurations that somebody asked about.
+    A job without regions goes, once its webhook does not wait any more. Of one with regions, only these and its own row stay.
+    Configurations that somebody asked about go, too.
     """
     done = 0
     for project in session.scalars(select(ProjectRow).where(projects.expires())):

@@ -72,7 +72,9 @@ def begin(session: Session, who: Key | Person) -> str:
     newest = select(SessionRow.digest).where(mine).order_by(SessionRow.created_at.desc(), SessionRow.digest)
     session.execute(delete(SessionRow).where(SessionRow.digest.in_(session.scalars(newest.offset(MOST_OF_ONE - 1)).all())))
     named: dict[str, Any] = (
-        {"key_id": who.id} if isinstance(who, Key) else {"subject": who.subject, "email": who.email, "groups": list(who.groups)}
+        {"key_id": who.id}
+        if isinstance(who, Key)
+        else {"subject": who.subject, "issuer": settings().oidc_issuer, "email": who.email, "groups": list(who.groups)}
     )
     token, digest = _new()
     session.add(SessionRow(digest=digest, expires_at=utcnow() + timedelta(hours=settings().session_hours), **named))
@@ -91,8 +93,8 @@ def choose(session: Session, token: str, project: str) -> str | None:
     if grant is None:
         return None
     other, digest = _new()
-    session.execute(update(SessionRow).where(SessionRow.digest == found.id).values(digest=digest, grant_id=grant.id))
-    return other
+    changed = update(SessionRow).where(SessionRow.digest == found.id).values(digest=digest, grant_id=grant.id).returning(SessionRow.digest)
+    return None if session.scalar(changed) is None else other  # another request may have chosen meanwhile
 
 
 def end(session: Session, token: str) -> None:
@@ -154,7 +156,8 @@ def _sessions(ids: Collection[str]) -> list[str]:
 
 
 def _signed_in(row: SessionRow, grant: GrantRow | None, known: dict[str, Key]) -> SignedIn:
-    person = None if row.subject is None else Person(row.subject, row.email, tuple(row.groups))
+    of_provider = row.subject is not None and row.issuer == settings().oidc_issuer
+    person = Person(row.subject, row.email, tuple(row.groups)) if of_provider and row.subject is not None else None
     project = None if grant is None else (grant.project, Scope(grant.scope))
     key = None if row.key_id is None else known.get(row.key_id)
     return SignedIn(row.digest, key, person, project, row.expires_at, row.last_used_at)

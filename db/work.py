@@ -77,7 +77,7 @@ def newcomer(session: Session) -> str | None:
     """Returns the id of the new job that gets a process beside the solvers, while they do other work; None when there is none.
 
     It is the first in the order of work among those of which no solver does anything. A step that was begun before is left to the solvers.
-    A project for which more solvers work than for another one gets no process: its new jobs wait for its own.
+    A project for which more solvers work than for another one that has work gets no process: its new jobs wait for its own.
     """
     now = utcnow()
     since = now - timedelta(seconds=NEW_SECONDS)
@@ -85,7 +85,8 @@ def newcomer(session: Session) -> str | None:
     if not found:
         return None
     of_project, _ = held = _held(session)
-    least = min(of_project.values(), default=0)
+    waiting = session.execute(_placed(), {"now": now, "places": 1, "most": MOST_KEYS}).all()
+    least = min([of_project[one.project] for one in waiting] + [*of_project.values()], default=0)
     return next((one.id for one in _sorted(found, *held) if of_project[one.project] <= least), None)
 
 

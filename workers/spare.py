@@ -1,16 +1,17 @@
 """What a process without a slot (workers.slots) does: pieces of new jobs, while all others do work that may last long.
 
 So a small job gets a process at once although a hundred long ones run. The operating system shares the cores between this process and
-the others, which lose no work: each keeps more than half of a core. What turns out to last long is given up when another new job waits.
-It begins anew when it is its turn.
+the others, which lose no work: each keeps more than half of a core. What a child process does for a new job is given up when it lasts
+long and another new job waits. It begins anew when it is its turn. Other work for a new job goes on to its end.
 """
 
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 
 from db import leases, pairs, steps, work, workers
-from db.session import database
+from db.session import UNAVAILABLE, database
 from db.settings import settings
 from db.states import WorkerState
 from jobs.kind import GivesWay, giving_way
@@ -60,6 +61,8 @@ class _Trial:
     def __call__(self) -> None:
         if self._slots.take() or time.monotonic() < self._until:
             return
-        with database().read() as session:
-            if work.newcomer(session) is not None:
-                raise GivesWay
+        waits = False
+        with suppress(*UNAVAILABLE), database().read() as session:  # an outage is no reason to give anything up
+            waits = work.newcomer(session) is not None
+        if waits:
+            raise GivesWay

@@ -6,10 +6,12 @@ import itertools
 import re
 import shutil
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from certifier.errors import SceneError
 from certifier.names import escaped
+from certifier.scene.bundle import BundleLimits
 from certifier.scene.draft import beside_model
 from certifier.scene.macros import in_xacro
 from certifier.scene.packages import packages_of, places_of, taken_from
@@ -60,59 +62,84 @@ def _models(root: Path) -> list[Path]:
     return [file for file in found if file.resolve() not in parts] or found
 
 
-def packages_in(model: Path, root: Path) -> dict[str, Path]:
+def packages_in(model: Path, root: Path, limits: BundleLimits) -> dict[str, Path]:
     """Returns where the packages are that a model names, in a zip that was unpacked below ``root``.
 
     A zip may have only a part of a package, or have it under another name. Then the package is where all files are that the model takes
     from it. Where that begins below the package's own directory, the files are copied into such directories.
 
     Raises:
-        SceneError: ``scene_package``; ``bundle_file`` for a model that is written in xacro, which is not expanded here.
+        SceneError: ``scene_package``; ``bundle_file`` for a model that is written in xacro, which is not expanded here;
+            ``bundle_too_large`` where the copies would have more bytes or files than a zip may have.
     """
     if in_xacro(model, model.name):
         hint = f"expand it, as `xacro {model.name} > robot.urdf` does, or use `ciris scene init` and `ciris scene add`, which expand it"
         raise SceneError("bundle_file", f"{model.name} is written in xacro, which the service does not run", hint=hint)
     given: dict[str, Path] = {}
+    copies = _Copies(root, limits.unpacked_bytes, limits.files)
     for name, files in taken_from(model).items():
         if not any(place.is_dir() for place in places_of(name, model, {})):
-            given[name] = _lent(name, files, model, root)
+            given[name] = _lent(name, files, model, root, copies)
     return packages_of(model, given, {}, {}, root)[0]
 
 
-def _lent(name: str, files: list[str], model: Path, root: Path) -> Path:
+def _lent(name: str, files: list[str], model: Path, root: Path, copies: _Copies) -> Path:
     above = [place for place in model.parents if place.is_relative_to(root)]
     paths = [[part for part in file.split("/") if part not in ("", ".")] for file in files]
-    for left in range(0 if any(".." in path for path in paths) else min(map(len, paths))):
+    climbs = any(".." in path for path in paths)  # nobody learns which files this machine has
+    for left in range(0 if climbs else min(map(len, paths))):
         head = paths[0][:left]
         for place in above:
             if all(path[:left] == head and place.joinpath(*path[left:]).is_file() for path in paths):
-                return _copied(head, place, ["/".join(path) for path in paths], root) if head else place
+                return copies.make(head, place, ["/".join(path) for path in paths]) if head else place
     count = f"{len(files)} files" if len(files) > 1 else "a file"
-    missing = next((file for file in files if not any((place / file).is_file() for place in above)), files[0])
+    there = (not climbs and any(place.joinpath(*path).is_file() for place in above) for path in paths)
+    missing = next((file for file, known in zip(files, there, strict=True) if not known), files[0])
     message = f"{model.name} takes {count} from the package {name}, and the zip has no {escaped(missing)[:200]}"
     hint = f"make the zip of the folder that has the model and these files, or put the package into it, as a folder {name}"
     raise SceneError("scene_package", message, hint=hint)
 
 
-def _copied(head: list[str], place: Path, files: list[str], root: Path) -> Path:
-    """Returns a new directory below ``root`` whose directory ``head`` has the files that begin so, and what they refer to, as in ``place``.
+@dataclass
+class _Copies:
+    """Makes packages of files that lie elsewhere in a zip. The process that unpacks may make no links.
 
-    The process that unpacks may make no links.
+    Attributes:
+        bytes, files: all copies together may have this many.
     """
-    package = next(path for k in itertools.count() if not (path := root / f"package-{k}").exists())
-    inside = package.joinpath(*head)
-    waiting = [place.joinpath(*file.split("/")[len(head) :]) for file in files]
-    copied = set[Path]()
-    while waiting:
-        file = waiting.pop().resolve()
-        if file in copied or not file.is_file() or not file.is_relative_to(place.resolve()):
-            continue
-        copied.add(file)
-        copy = inside / file.relative_to(place.resolve())
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(file, copy)
-        waiting += [file.parent / reference for reference in references(file) if "://" not in reference]
-    return package
+
+    root: Path
+    bytes: int
+    files: int
+
+    def make(self, head: list[str], place: Path, files: list[str]) -> Path:
+        """Returns a new directory below the root. In it ``head`` has the files that begin so, and what they refer to, as in ``place``.
+
+        Raises:
+            SceneError: ``bundle_too_large``.
+        """
+        package = next(path for k in itertools.count() if not (path := self.root / f"package-{k}").exists())
+        inside = package.joinpath(*head)
+        waiting = [place.joinpath(*file.split("/")[len(head) :]) for file in files]
+        copied = set[Path]()
+        while waiting:
+            file = waiting.pop().resolve()
+            if file in copied or not file.is_file() or not file.is_relative_to(place.resolve()):
+                continue
+            copied.add(file)
+            self._count(file)
+            copy = inside / file.relative_to(place.resolve())
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(file, copy)
+            waiting += [file.parent / reference for reference in references(file) if "://" not in reference]
+        return package
+
+    def _count(self, file: Path) -> None:
+        self.bytes -= file.stat().st_size
+        self.files -= 1
+        if self.bytes < 0 or self.files < 0:
+            hint = "put the packages into the zip under their own names"
+            raise SceneError("bundle_too_large", "the model takes the same files from too many packages", field="bundle", hint=hint)
 
 
 def keep_only(model: Path, root: Path, packages: dict[str, Path]) -> None:

@@ -32,20 +32,21 @@ def parse_bundle(payload: dict[str, Any]) -> dict[str, Any]:
         SceneError: as :func:`certifier.scene.bundle.load_bundle` says.
     """
     root = Path(payload["root"])
-    found = root / unpack(Path(payload["archive"]), root, BundleLimits(**payload["limits"]))
-    if found.suffix in MODELS or is_mjcf(found):
-        return _drafted(root, found).to_document()
+    limits = BundleLimits(**payload["limits"])
+    found = root / unpack(Path(payload["archive"]), root, limits)
+    if found.is_file() and (found.suffix in MODELS or is_mjcf(found)):
+        return _drafted(root, found, limits).to_document()
     check_bundle(root, found)
     return parse({"path": str(found)})
 
 
-def _drafted(root: Path, model: Path) -> Scene:
+def _drafted(root: Path, model: Path, limits: BundleLimits) -> Scene:
     """Returns the scene of a robot's model that came without one, as ``ciris scene init`` drafts it.
 
     Drake sees the model once it has passed with a scene file that has nothing but the model.
     """
     scene = root / f"{model.stem}.yaml"
-    packages = packages_in(model, root)
+    packages = packages_in(model, root, limits)
     keep_only(model, root, packages)
     directive = {"add_model": {"name": "model", "file": model.relative_to(root).as_posix()}}
     besides = {"packages": {name: path.relative_to(root).as_posix() for name, path in packages.items() if path.is_relative_to(root)}}

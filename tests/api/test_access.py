@@ -105,7 +105,8 @@ def test_every_route_asks_for_a_scope_or_is_public(database: Database) -> None:
     asked = [route for route in routes if hasattr(route, "dependant") and route.path not in PUBLIC]
     assert len(asked) > 70
     for route in asked:
-        calls = [dependency.call for dependency in route.dependant.dependencies]
+        own = route.dependant.dependencies
+        calls = [one.call for dependency in own for one in (dependency, *dependency.dependencies)]
         assert any(isinstance(call, _Needs) for call in calls), route.path
 
 

@@ -32,7 +32,7 @@ def things(client: TestClient, region: str, busy: str) -> dict[str, str]:
     (job,) = [job for job in client.get("/v1/jobs").json()["jobs"] if job["region"] == region]
     (worker,) = client.get("/v1/workers").json()["workers"]
     known = {"region_id": region, "job_id": job["id"], "scene_id": job["scene"], "worker_id": worker["id"], "pair": "0"}
-    return known | {"motion_id": "none", "name": "none", "scene_name": "slider"}
+    return known | {"motion_id": "none", "name": "none", "scene_name": "slider", "project": "default"}
 
 
 def addresses(client: TestClient, things: dict[str, str]) -> dict[str, set[str]]:

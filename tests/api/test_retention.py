@@ -89,5 +89,6 @@ def test_a_project_without_room_takes_nothing_more_but_shows_and_deletes(
         "solver_seconds": 0.2,
         "max_solver_seconds": None,
         "month_ends_at": client.get("/v1/project").json()["month_ends_at"],
+        "created_at": client.get("/v1/project").json()["created_at"],
     }
     assert client.get("/v1/project").json()["bytes"] < size

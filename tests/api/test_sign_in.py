@@ -286,7 +286,9 @@ def test_who_has_no_grant_is_told_whom_to_ask(service: TestClient, provider: Rea
     for subject in ("mallory", "alice@example.org"):
         page = sign_in(service, provider, subject)
         assert "no project of this service lets you in" in page
-        assert f"ciris project grant PROJECT --person {subject}" in page
+        # A grant to the other one would let in whoever has that address.
+        assert ("ciris project grant PROJECT --person mallory" in page) == (subject == "mallory")
+        assert "--person alice@example.org" not in page
         assert service.get("/login/project").status_code == 403
         assert scope_of(service)[0] == 401
     grant(database, "welding", Kind.PERSON, "mallory", Scope.READ)
@@ -513,6 +515,28 @@ def test_what_the_token_does_not_say_is_asked_for(fooled: TestClient, liar: Liar
         assert come_back(fooled, sent)[0] == 200
         with database.read() as session:
             assert [row.email for row in session.scalars(select(SessionRow))] == [expected]
+
+
+@pytest.mark.parametrize(
+    ("token", "userinfo"),
+    [
+        ({"email": "alice@example.org"}, {"email": "mallory@example.org", "email_verified": True}),
+        ({"email_verified": True}, {"email": "alice@example.org"}),
+        ({"email": "alice@example.org", "email_verified": False}, {"email": "alice@example.org", "email_verified": True}),
+        ({"email": "\u212aate@example.org", "email_verified": True}, {}),
+    ],
+    ids=["address of the token", "address of userinfo", "the token says no", "a letter that is K only in capitals"],
+)
+def test_an_address_counts_where_the_same_document_says_that_it_is_verified(
+    fooled: TestClient, liar: Liar, database: Database, token: dict[str, object], userinfo: dict[str, object]
+) -> None:
+    sent = attempt(fooled)
+    liar.knows(sent["nonce"], **token)
+    liar.userinfo = {"sub": liar.claims["sub"], **userinfo}
+    assert come_back(fooled, sent)[0] == 200
+    with database.read() as session:
+        (email,) = session.scalars(select(SessionRow.email))
+    assert email in (None, "mallory@example.org")
 
 
 def of_provider(fooled: TestClient) -> tuple[int, str]:

@@ -73,6 +73,7 @@ def test_a_former_map_is_gone_on_with(ciris: Ciris, tmp_path: Path) -> None:
 
 
 def test_what_was_asked_is_known_to_the_service_alone(ciris: Ciris) -> None:
+    """The error's code is ``option``."""
     done = ciris("map", PLANAR, "--local", "--asked")
     assert (done.status, done.stderr) == (2, "error: --asked: is only for jobs of the service (leave out it or --local)\n")
 

@@ -208,7 +208,14 @@ def test_a_map_is_asked_for(opened: Any, url: str, client: TestClient) -> None:
     opened.wait_for_url(f"{url}/jobs/*")
     (job,) = jobs(client)
     assert job["kind"] == "map"
-    assert job["options"] == {"coverage": 0.7, "at": [pytest.approx([0.1, -0.2])], "random_seed": 0, "former": None, "paths": []}
+    assert job["options"] == {
+        "coverage": 0.7,
+        "at": [pytest.approx([0.1, -0.2])],
+        "random_seed": 0,
+        "former": None,
+        "paths": [],
+        "asked": False,
+    }
 
 
 def copied(page: Any, form: str) -> str:

@@ -136,6 +136,23 @@ def test_a_session_works_by_its_grant_and_chooses_by_a_new_token(db: Database) -
         grants.revoke(session, "welding", Kind.GROUP, "robotics")
 
 
+def test_people_of_another_provider_are_not_let_in(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    with db.write() as session:
+        grants.add(session, DEFAULT_PROJECT, Kind.PERSON, "alice@example.org", Scope.ADMIN)
+    token = begin(db, ALICE)
+    with db.write() as session:
+        token = sessions.choose(session, token, DEFAULT_PROJECT) or ""
+    found = held(db, token)
+    assert found is not None
+    assert found.person == ALICE
+    monkeypatch.setattr(sessions, "settings", lambda: Settings(oidc_issuer="https://login.example.org", oidc_client_id="ciris"))
+    found = held(db, token)
+    assert found is not None
+    assert found.person is None
+    with db.write() as session:
+        assert sessions.choose(session, token, DEFAULT_PROJECT) is None
+
+
 def test_the_use_of_a_session_is_noted_now_and_then(db: Database) -> None:
     key = a_key(db)
     token = begin(db, key)

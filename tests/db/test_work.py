@@ -283,6 +283,18 @@ def test_new_jobs_of_a_project_that_has_more_solvers_than_another_wait(db: Datab
     assert newcomer(db) == small, "both have as many"
 
 
+def test_new_jobs_do_not_go_before_the_work_of_a_project_that_has_no_solver(db: Database) -> None:
+    job_id = a_job_of(db, "a0", project="a", pair_count=0)
+    a_step(db, job_id)
+    claimed_step(db, job_id)
+    small = a_job_of(db, "a9", project="a")
+    assert newcomer(db) == small
+    waits = a_job_of(db, "b0", project="b")
+    with db.write() as session:
+        jobs.lock(session, waits).claimed_at = utcnow() - timedelta(seconds=work.NEW_SECONDS)
+    assert newcomer(db) is None
+
+
 def test_a_job_gets_its_first_piece_at_once_beside_a_hundred_of_its_key(db: Database) -> None:
     for _ in range(100):
         a_job_of(db, "key", pair_count=20)

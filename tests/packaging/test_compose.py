@@ -65,7 +65,9 @@ def test_no_secret_has_a_default() -> None:
     secrets = re.findall(r"\$\{(\w*(?:PASSWORD|SECRET|KEY)\w*)(:.)?", text)
     assert secrets
     # Without an identity provider there is none of this.
-    assert {operator for name, operator in secrets if name != "CIRIS_OIDC_CLIENT_SECRET"} == {":?"}, "whoever starts it without one is told so"
+    assert {operator for name, operator in secrets if name != "CIRIS_OIDC_CLIENT_SECRET"} == {":?"}, (
+        "whoever starts it without one is told so"
+    )
 
 
 def test_no_container_is_the_only_one_of_its_kind() -> None:

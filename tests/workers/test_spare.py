@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from sqlalchemy import select, update
+from sqlalchemy.exc import OperationalError
 
 from certifier.growth.options import GrowthOptions
 from certifier.jobs.local import grow
@@ -19,6 +20,7 @@ from db.models import JobRow, StepRow, WorkerRow
 from db.session import database
 from db.states import WorkerState
 from db.workers import Made, WorkerKind
+from jobs.kind import GivesWay
 from tests.scenes import slider
 from tests.services import Queue
 from tests.workers.options import box_around, grow_box
@@ -95,6 +97,20 @@ def test_without_a_slot_only_what_new_jobs_wait_for_is_done(job_id: str, own_que
     with database().write() as session:
         session.execute(update(JobRow).where(JobRow.id == other).values(claimed_at=job_of(other).created_at.replace(year=2000)))
     assert work_for_newcomer(Slots(0)) is None, "the job is not new any more"
+
+
+def test_a_short_outage_of_the_database_fails_no_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spare, "TRIAL_SECONDS", 0.0)
+    trial = spare._Trial(Slots(0))
+    monkeypatch.setattr(spare.work, "newcomer", lambda session: "another job")
+    with pytest.raises(GivesWay):
+        trial()
+
+    def gone(session: object) -> str:
+        raise OperationalError("", None, Exception("the server closed the connection"))
+
+    monkeypatch.setattr(spare.work, "newcomer", gone)
+    trial()
 
 
 @pytest.mark.usefixtures("no_wait")

@@ -34,6 +34,7 @@ def upgrade() -> None:
         sa.Column("digest", sa.String(64), nullable=False),
         sa.Column("key_id", sa.String(36), nullable=True),
         sa.Column("subject", sa.Text(), nullable=True),
+        sa.Column("issuer", sa.Text(), nullable=True),
         sa.Column("email", sa.Text(), nullable=True),
         sa.Column("groups", sa.JSON(), nullable=False),
         sa.Column("grant_id", sa.String(36), nullable=True),

@@ -26,6 +26,7 @@ def upgrade() -> None:
         sa.ForeignKeyConstraint(["scene_id"], ["scenes.id"], name=op.f("fk_questions_scene_id")),
         sa.PrimaryKeyConstraint("scene_id", "digest", name=op.f("pk_questions")),
     )
+    op.create_index("ix_questions_project_asked_at", "questions", ["project", "asked_at"])
 
 
 def downgrade() -> None:

@@ -175,6 +175,7 @@ def test_what_a_package_has_beside_its_robot_is_deleted_before_drake_sees_anythi
         (zipped({"bundle.json": "[]"}), "bundle_zip"),
         (zipped({"bundle.json": "{"}), "bundle_zip"),
         (zipped({"bundle.json": '{"scene": 3}'}), "scene_not_found"),
+        (zipped({"bundle.json": '{"scene": "arm.urdf"}'}), "scene_not_found"),
         (zipped({"bundle.json": '{"scene": "../scene.yaml"}'}), "bundle_path"),
         (zipped({"../evil": ""}), "bundle_path"),
         (zipped({"/evil": ""}), "bundle_path"),
@@ -188,6 +189,35 @@ def test_a_bad_zip_is_refused(bundle, code):
     with pytest.raises(SceneError) as caught:
         load_bundle(bundle, BundleLimits(bytes=40000, unpacked_bytes=20000, files=20))
     assert caught.value.code == code
+
+
+def robot_with(*uris):
+    link = "<link name='l{}'><collision><geometry><mesh filename='{}'/></geometry></collision></link>"
+    joint = "<joint name='j{0}' type='revolute'><parent link='base'/><child link='l{0}'/><axis xyz='0 0 1'/>"
+    joint += "<limit lower='-1' upper='1' effort='1' velocity='1'/></joint>"
+    parts = [link.format(i, uri) + joint.format(i) for i, uri in enumerate(uris)]
+    return f"<robot name='arm'><link name='base'/>{''.join(parts)}</robot>"
+
+
+def test_copies_for_packages_are_limited_as_the_zip_is():
+    """The same file is taken from one package after the other, so it would be written as often."""
+    arm = robot_with(*(f"package://p{i}/meshes/t.obj" for i in range(12)))
+    limits = BundleLimits(unpacked_bytes=20000)
+    assert load_bundle(zipped({"arm.urdf": arm, "t.obj": TETRAHEDRON}), limits).geometries
+    for files in ({"arm.urdf": arm, "t.obj": TETRAHEDRON + 2000 * "#"}, {"arm.urdf": arm, "t.obj": TETRAHEDRON, "a/b/c.txt": ""}):
+        with pytest.raises(SceneError) as caught:
+            load_bundle(zipped(files), limits if "a/b/c.txt" not in files else BundleLimits(files=6))
+        assert caught.value.code == "bundle_too_large"
+
+
+@pytest.mark.parametrize("taken", ["package://p//etc/passwd", "package://p/../../../../../../etc/passwd"])
+def test_nobody_learns_which_files_the_machine_has(taken):
+    said = []
+    for uri in (taken, taken.replace("passwd", "nothing-of-that-name")):
+        with pytest.raises(SceneError) as caught:
+            load_bundle(zipped({"arm.urdf": robot_with(uri, "package://p/other.obj")}))
+        said.append((caught.value.code, str(caught.value).replace("passwd", "X").replace("nothing-of-that-name", "X")))
+    assert said[0] == said[1]
 
 
 def test_a_link_in_a_zip_is_refused():
