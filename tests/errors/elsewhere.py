@@ -55,6 +55,7 @@ TESTED = {
     "certifier/scene/meshes/stl.py:_text": "tests/certifier/scene/test_meshes.py",
     "certifier/scene/meshes/stl.py:_vertex": "tests/certifier/scene/test_meshes.py",
     "certifier/scene/meshes/stl.py:read_stl": "tests/certifier/scene/test_meshes.py",
+    "certifier/scene/robot.py:_count": "tests/certifier/scene/test_bundle.py",
     "certifier/scene/strict.py:taken": "tests/certifier/scene/test_strict.py",
     "certifier/step/step.py:_check_size": "tests/certifier/step/test_step.py",
     "certifier/step/step.py:step": "tests/certifier/step/test_step.py",
