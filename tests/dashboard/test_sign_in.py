@@ -102,7 +102,7 @@ def test_another_site_reaches_nothing_with_the_cookie(
     assert {name: (cookie["sameSite"], cookie["httpOnly"]) for name, cookie in cookies.items()} == {"ciris_session": ("Strict", True)}
     for method, path, status in (("POST", "/logout", 403), ("GET", "/jobs", 303)):
         page.goto(provider.url.replace("127.0.0.1", "localhost"))
-        with page.expect_response(f"{url}{path}*") as response:
+        with page.expect_navigation(), page.expect_response(f"{url}{path}*") as response:
             page.evaluate(
                 "([action, method]) => { const form = document.documentElement.appendChild(document.createElement('form'));"
                 " Object.assign(form, {action, method}); form.submit(); }",
