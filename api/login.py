@@ -125,9 +125,8 @@ def _login(request: Request, next: str, *, wrong: bool = False) -> Response:
 
 async def _into(request: Request, db: Database, next: str, project: str) -> Response:
     """Makes a project the one that the session works in. Without a grant there, the page for choosing says which there are."""
-    given = session_of(request.headers)
-    known = given is not None and await run_in_threadpool(_signed_in, db, request) is not None
-    token = await _choose(db, given, project) if given is not None and known else None
+    found = await run_in_threadpool(_signed_in, db, request)  # only who has signed in makes the database write
+    token = None if found is None else await _choose(db, session_of(request.headers) or "", project)
     response = RedirectResponse(_choice(next) if token is None else _local(next), HTTPStatus.SEE_OTHER)
     if token is not None:
         _keep(request, response, token)

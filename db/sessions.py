@@ -156,8 +156,9 @@ def _sessions(ids: Collection[str]) -> list[str]:
 
 
 def _signed_in(row: SessionRow, grant: GrantRow | None, known: dict[str, Key]) -> SignedIn:
-    of_provider = row.subject is not None and row.issuer == settings().oidc_issuer
-    person = Person(row.subject, row.email, tuple(row.groups)) if of_provider and row.subject is not None else None
+    person = None
+    if row.subject is not None and row.issuer == settings().oidc_issuer:
+        person = Person(row.subject, row.email, tuple(row.groups))
     project = None if grant is None else (grant.project, Scope(grant.scope))
     key = None if row.key_id is None else known.get(row.key_id)
     return SignedIn(row.digest, key, person, project, row.expires_at, row.last_used_at)

@@ -86,7 +86,7 @@ def newcomer(session: Session) -> str | None:
         return None
     of_project, _ = held = _held(session)
     waiting = session.execute(_placed(), {"now": now, "places": 1, "most": MOST_KEYS}).all()
-    least = min([of_project[one.project] for one in waiting] + [*of_project.values()], default=0)
+    least = min(of_project[project] for project in {*of_project, *(one.project for one in waiting)})
     return next((one.id for one in _sorted(found, *held) if of_project[one.project] <= least), None)
 
 

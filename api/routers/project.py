@@ -66,9 +66,7 @@ def list_keys(db: Db, after: Cursor = None, limit: Listed = 100) -> KeyPage:
 
 @router.delete("/keys/{name}", status_code=status.HTTP_204_NO_CONTENT)
 @writing
-def revoke_key(
-    name: Annotated[str, Path(description="The name of a key that has not been revoked.", examples=["planner"])], caller: Admin, db: Db
-) -> None:
+def revoke_key(name: KeyName, caller: Admin, db: Db) -> None:
     """Revokes the key of this name, the caller's own too. The service refuses it a second later at the latest."""
     with db.write() as session:
         keys.revoke(session, name, caller.project)

@@ -97,10 +97,9 @@ def _reach_of_ball(axes: Sequence[Point], poses: Sequence[Numbers], vertices: Se
         e = _scaled(exact(_on_axis(axes, poses, points, center, i - 1)), axes[i - 1])
         reach += _farthest_turned(points, axes[i], _line(poses[i], axes[i]), e)
         points, i = [placed(poses[i - 1], e)], i - 2
-        if i >= 0:
-            continue
-        return reach + _root(_square(minus(points[0], center)))
-    return reach + _farthest_turned(points, axes[0], _line(poses[0], axes[0]), center)
+    if i == 0:
+        return reach + _farthest_turned(points, axes[0], _line(poses[0], axes[0]), center)
+    return reach + _root(_square(minus(points[0], center)))
 
 
 def _on_axis(axes: Sequence[Point], poses: Sequence[Numbers], points: Sequence[Point], center: Point, i: int) -> float:
@@ -124,12 +123,12 @@ def _farthest_turned(points: Sequence[Point], axis: Point, line: tuple[Point, Po
     """
     offset = minus(other, line[0])
     g = dot(offset, line[1])
-    sigma = _square(offset) - g * g
+    sigma_2 = _square(offset) - g * g
     squares = []
     for p in points:
         h = dot(p, axis)
-        rho = _square(p) - h * h
-        squares.append((h - g) * (h - g) + rho + sigma + 2 * _root(rho * sigma))
+        rho_2 = _square(p) - h * h
+        squares.append((h - g) * (h - g) + rho_2 + sigma_2 + 2 * _root(rho_2 * sigma_2))
     return _root(max(squares))
 
 

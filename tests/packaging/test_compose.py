@@ -66,7 +66,7 @@ def test_no_secret_has_a_default() -> None:
     assert secrets
     # Without an identity provider there is none of this.
     assert {operator for name, operator in secrets if name != "CIRIS_OIDC_CLIENT_SECRET"} == {":?"}, (
-        "whoever starts it without one is told so"
+        "compose refuses to start without it, and says so"
     )
 
 

@@ -15,7 +15,7 @@ from workers.slots import Slots
 
 
 class Forked:
-    """A process that does with the slots what it is told."""
+    """A process that takes and leaves slots when the test asks for it."""
 
     def __init__(self, slots: Slots) -> None:
         parent = os.getpid()
