@@ -51,7 +51,8 @@ HARD = 6 * SLICE
 that fewer joints move (certifier.partition.search), cells are cut off from the first round on."""
 LOSS, PATIENCE = 0.002, 108 * SLICE
 """While open cells of a pair are cut off, its faces lose at most the share LOSS of the polytope in a round. The share doubles after every
-PATIENCE cells of a hard pair."""
+PATIENCE cells of a hard pair; where faces separate volumes that fewer joints move, after every PIECES slices, because more cells do not
+help where these volumes touch."""
 FAST_LOSS = 0.05
 """They lose at most this share before that, and when the pair's effort is spent. From then on, the share doubles after every PIECES
 slices."""
@@ -241,7 +242,8 @@ def _most_loss(state: GrowthState, whole: Whole, pair: int, report: Outcomes) ->
         return _doubled(LATE_LOSS, (_gone(whole) - LATE) / LATER)
     effort, spent = _effort(state, whole, pair), whole.spent[pair]
     if hard < spent < effort:
-        return _doubled(LOSS, max(spent - HARD, 0) // PATIENCE)
+        patience = PATIENCE if hard else PIECES * SLICE
+        return _doubled(LOSS, max(spent - HARD, 0) // patience)
     return _doubled(FAST_LOSS, max(spent - effort, 0) // (PIECES * SLICE))
 
 

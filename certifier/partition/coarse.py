@@ -153,17 +153,22 @@ STOUT = 1.25
 """A slim capsule for the angles of one joint has at most this many times that radius."""
 
 
-def slim_volume(kinematics: Kinematics, volume: Volume, other: Volume) -> Volume | None:
-    """Returns a coarse volume that moves with as few joints against another volume as is worth it, or None."""
+def slim_volumes(kinematics: Kinematics, volume: Volume, other: Volume) -> list[Volume]:
+    """Returns coarse volumes that are hardly larger than a volume; the one that most joints move against another volume first.
+
+    They are a capsule for the angles of one joint, and a ball for those of as many as is worth it, where these are slim enough.
+    """
     geometries = [kinematics.scene.geometry(name) for name in volume.geometries]
     own = _farthest(volume.vertices, volume.vertices.mean(axis=0)) + volume.radius
-    roots = _roots(kinematics, volume, other)
+    roots, found = _roots(kinematics, volume, other), []
+    slim = capsule(kinematics, geometries)
+    if slim is not None and slim.body in roots and slim.radius <= STOUT * own:
+        found.append(slim)
     for body in reversed(roots):
-        found = ball(kinematics, geometries, body) if len(kinematics.chain(body, volume.body)) > 1 else None
-        if found is not None and found.radius <= FAT * own:
-            return found
-    found = capsule(kinematics, geometries)
-    return found if found is not None and found.body in roots and found.radius <= STOUT * own else None
+        slim = ball(kinematics, geometries, body) if len(kinematics.chain(body, volume.body)) > 1 else None
+        if slim is not None and slim.radius <= FAT * own:
+            return [*found, slim]
+    return found
 
 
 def common_balls(kinematics: Kinematics, volume: Volume, other: Volume) -> list[Volume]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from certifier.model import Array, Volume
 from certifier.partition.area import Area
-from certifier.partition.coarse import common_balls, slim_volume
+from certifier.partition.coarse import common_balls, slim_volumes
 from certifier.partition.hulls import gaps, hull
 from certifier.proof import limits
 from certifier.proof.partition import Coarse
@@ -63,19 +63,17 @@ def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume], apart: tup
     kinematics, (a, b) = area.kinematics, volumes
     if len(kinematics.chain(a.body, b.body)) < LONG:
         return Levels(((), ()), [(0, 0)], 1, False)
-    slim = slim_volume(kinematics, a, b), slim_volume(kinematics, b, a)
+    slim = slim_volumes(kinematics, a, b), slim_volumes(kinematics, b, a)
     balls = common_balls(kinematics, a, b), common_balls(kinematics, b, a)
-    first, second = ((*([one] if one else []), *more)[: limits.COARSE] for one, more in zip(slim, balls, strict=True))
+    first, second = ((*few, *more)[: limits.COARSE] for few, more in zip(slim, balls, strict=True))
     known = (a, *first), (b, *second)
 
     def moving(level: Level) -> int:
         return len(kinematics.chain(known[0][level[0]].body, known[1][level[1]].body))
 
-    levels: list[Level] = [(0, 0)]
+    slender = len(slim[0]), len(slim[1])
+    levels: list[Level] = [(min(i, slender[0]), min(i, slender[1])) for i in range(1 + max(slender))]
     two_chains = bool(first and second) and moving((0, 0)) >= MANY_JOINTS
-    slender = int(slim[0] is not None), int(slim[1] is not None)
-    if slender != (0, 0):
-        levels.append(slender)
     fat = itertools.product(*([0, *range(1 + number, len(volumes))] for number, volumes in zip(slender, known, strict=True)))
     candidates = sorted((level for level in fat if 0 < moving(level) < moving(levels[-1])), key=moving)
     fats: list[Level] = []

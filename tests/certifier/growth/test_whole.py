@@ -21,7 +21,7 @@ from certifier.growth.actions import Certify, Finish, Outcomes, Propose
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import ENOUGH, GrowthOptions
 from certifier.growth.state import Best, GrowthState, Start, Whole
-from certifier.growth.whole import FAR, GAIN, HARD, LATE, LATEST, LEAST, PARTS, PIECES, SLICE, SMALLER, VERIFIED
+from certifier.growth.whole import FAR, GAIN, HARD, LATE, LATEST, LEAST, LOSS, PARTS, PATIENCE, PIECES, SLICE, SMALLER, VERIFIED
 from certifier.jobs import local
 from certifier.jobs.local import grow
 from certifier.model import WORLD, Polytope
@@ -231,6 +231,14 @@ def test_contacts_are_costly_where_faces_lose_much_or_there_are_none(lost, cut, 
     assert whole._costly(state, report, [3], made) == ([3] if costly else [])
     report.weaknesses[3] = Weakness(CORNER, np.zeros(2))  # no contacts, but points where a plane is missing
     assert whole._costly(state, report, [3], Cut(smaller, [Made(), Made(1, 0.1)], polytope)) == []
+
+
+@pytest.mark.parametrize(("joints", "begin", "cells"), [((), HARD, PATIENCE), ((0,), 0, PIECES * SLICE)])
+def test_faces_may_soon_lose_more_where_they_separate_volumes_that_fewer_joints_move(joints, begin, cells):
+    report = SimpleNamespace(weaknesses={1: replace(weak(CORNER), joints=joints)})
+    for spent, times in ((begin + 1, 0), (HARD + cells - 1, 0), (HARD + cells, 1), (HARD + 2 * cells, 2)):
+        state = Whole(0.5, SCENE.polytope([], []), *np.zeros((2, 2)), *np.zeros((2, 2, 8)), spent={1: spent})
+        assert whole._most_loss(GrowthState(options(cells=10**6)), state, 1, report) == LOSS * 2**times
 
 
 @pytest.mark.parametrize(("touching", "when"), [(True, LATE), (False, LATEST)])

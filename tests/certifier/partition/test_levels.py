@@ -34,7 +34,8 @@ from certifier.verify.separations import verify_separation
 from tests.certifier.scenes import box, cube, planar_arm, two_arms
 from tests.certifier.truth import distances_at
 
-EXAMPLE = Path(__file__).parents[3] / "examples" / "ur3e_bin"
+EXAMPLES = Path(__file__).parents[3] / "examples"
+EXAMPLE = EXAMPLES / "ur3e_bin"
 CELLS = 60
 HANDS = 8
 """The pair of both last links, which six joints move."""
@@ -121,6 +122,34 @@ def test_a_pair_is_certified_on_several_levels_and_its_twin_is_refuted():
     assert set(proof.choices.tolist()) == {0, 1, 2}
     larger = CellCertification(scene, cube(scene, scene.to_s(q), 0.6)).certify(index, 600)
     assert larger.outcome is Outcome.REFUTED
+
+
+def test_a_capsule_for_one_joint_is_tried_between_the_body_and_a_ball_for_three():
+    """The flange of iiwa_gripper in its shelf; a configuration beside a board, and its twin where the flange would be in another one."""
+    scene, q = load_scene(EXAMPLES / "iiwa_gripper" / "scene.yaml"), np.array([2.694, -1.059, -1.179, -1.004, -1.646, 0.915, 0.313])
+    polytope = cube(scene, scene.to_s(q), 0.25)
+    index, twin = (
+        next(i for i, pair in enumerate(scene.pairs) if {pair.a, pair.b} == {"arm/link_7/box", f"shelf/boards/{board}"})
+        for board in ("right", "top")
+    )
+    area, coarse, found = levels(scene, polytope, index)
+    flanges = [(a if a.geometries == ("arm/link_7/box",) else b) for a, b in found]
+    assert [(len(area.kinematics.chain(a.body, b.body)), len(flange.vertices)) for (a, b), flange in zip(found, flanges, strict=True)] == [
+        (7, 8),
+        (6, 2),
+        (4, 1),
+    ]
+    exact = ExactKinematics.at(scene, [])
+    for volume in (*coarse[0], *coarse[1]):
+        check_coarse(scene, exact, volume)
+    certification = CellCertification(scene, polytope)
+    result = certification.certify(index, 600)
+    assert result.outcome is Outcome.CERTIFIED, result
+    proof = PartitionProof.from_bytes(result.proof, scene)
+    assert sorted(len(volume.vertices) for volumes in proof.coarse for volume in volumes) == [1, 2], "cells use both"
+    samples = Area.of(scene, polytope, 3).samples
+    assert 0 < verify_separation(proof).gap <= min(distances_at(replace(scene, pairs=(scene.pairs[index],)), samples).values())
+    assert certification.certify(twin, 600).outcome is Outcome.REFUTED
 
 
 def test_a_proof_names_only_the_coarse_volumes_that_its_cells_choose():
