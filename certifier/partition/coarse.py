@@ -6,7 +6,6 @@ certifier.verify.coarse says why they do, and checks it exactly. Here everything
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -94,15 +93,16 @@ class _Linkage:
         return float(np.sqrt((h - g) ** 2 + (rho + sigma) ** 2).max())
 
 
-def ball(kinematics: Kinematics, geometries: Sequence[Geometry], body: str) -> Volume | None:
-    """Returns a ball fixed to a body that holds geometries at all angles of the joints between.
+@lru_cache(maxsize=1024)
+def ball(kinematics: Kinematics, names: tuple[str, ...], body: str) -> Volume | None:
+    """Returns a ball fixed to a body that holds geometries, by their names, at all angles of the joints between.
 
     Its centre is on the axis of the joint next to the body, where the ball has the least radius.
 
     Returns:
         None if a geometry is fixed to the body, or not all are behind the same joint of it, or one is behind a joint that slides.
     """
-    linkages = [_Linkage.between(kinematics, body, geometry) for geometry in geometries]
+    linkages = [_Linkage.between(kinematics, body, kinematics.scene.geometry(name)) for name in names]
     known = [linkage for linkage in linkages if linkage is not None]
     if len(known) < len(linkages) or len({linkage.first for linkage in known}) != 1:
         return None
@@ -113,18 +113,19 @@ def ball(kinematics: Kinematics, geometries: Sequence[Geometry], body: str) -> V
 
     t = minimize_scalar(radius).x  # convex: it is the largest of distances from points on circles
     center = t * known[0].axes[0]
-    names = tuple(geometry.name for geometry in geometries)
     return Volume(names, body, _placed(known[0].poses[0], center[None]), _enlarged(radius(t)))
 
 
-def capsule(kinematics: Kinematics, geometries: Sequence[Geometry]) -> Volume | None:
-    """Returns a capsule along the axis of the joint that moves geometries of one body, which holds them at all angles of this joint.
+@lru_cache(maxsize=1024)
+def capsule(kinematics: Kinematics, names: tuple[str, ...]) -> Volume | None:
+    """Returns a capsule along the axis of the joint that moves geometries of one body, by their names, and holds them at all its angles.
 
     It is fixed to the root of the rigid part before the joint. Among those with the least radius, it is the shortest.
 
     Returns:
         None if no joint moves the geometries, or one that slides.
     """
+    geometries = [kinematics.scene.geometry(name) for name in names]
     root = kinematics.rigid_root(geometries[0].body)
     if root == WORLD:
         return None
@@ -143,7 +144,6 @@ def capsule(kinematics: Kinematics, geometries: Sequence[Geometry]) -> Volume | 
         lower = upper = 0.5 * (lower + upper)
     distance = float(np.linalg.norm(vertices - np.clip(along, lower, upper)[:, None] * axis, axis=1).max())
     ends = _placed(linkage.poses[0], np.outer([lower, upper], axis))
-    names = tuple(geometry.name for geometry in geometries)
     return Volume(names, body, ends, _enlarged(distance + max(geometry.radius for geometry in geometries)))
 
 
@@ -158,14 +158,13 @@ def slim_volumes(kinematics: Kinematics, volume: Volume, other: Volume) -> list[
 
     They are a capsule for the angles of one joint, and a ball for those of as many as is worth it, where these are slim enough.
     """
-    geometries = [kinematics.scene.geometry(name) for name in volume.geometries]
     own = _farthest(volume.vertices, volume.vertices.mean(axis=0)) + volume.radius
     roots, found = _roots(kinematics, volume, other), []
-    slim = capsule(kinematics, geometries)
+    slim = capsule(kinematics, volume.geometries)
     if slim is not None and slim.body in roots and slim.radius <= STOUT * own:
         found.append(slim)
     for body in reversed(roots):
-        slim = ball(kinematics, geometries, body) if len(kinematics.chain(body, volume.body)) > 1 else None
+        slim = ball(kinematics, volume.geometries, body) if len(kinematics.chain(body, volume.body)) > 1 else None
         if slim is not None and slim.radius <= FAT * own:
             return [*found, slim]
     return found
@@ -189,8 +188,8 @@ def common_balls(kinematics: Kinematics, volume: Volume, other: Volume) -> list[
 @lru_cache(maxsize=1024)
 def _ball_about(kinematics: Kinematics, body: str, moved: str | None) -> Volume | None:
     """Returns the ball fixed to a body that holds all geometries that a moved body carries, itself included."""
-    together = [g for g in kinematics.scene.geometries if moved in {g.body, *kinematics.ancestors(g.body)}]
-    return ball(kinematics, together, body)
+    together = (g.name for g in kinematics.scene.geometries if moved in {g.body, *kinematics.ancestors(g.body)})
+    return ball(kinematics, tuple(together), body)
 
 
 def _roots(kinematics: Kinematics, volume: Volume, other: Volume) -> list[str]:

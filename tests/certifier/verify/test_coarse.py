@@ -77,8 +77,8 @@ def tree(seed: int, kinds=(JointKind.REVOLUTE, JointKind.REVOLUTE, JointKind.WEL
 def made(scene: Scene) -> list[Volume]:
     """All balls, about every body, and all capsules."""
     kinematics = Kinematics.of(scene)
-    found = [ball(kinematics, [geometry], body) for geometry in scene.geometries for body in scene.bodies]
-    found += [capsule(kinematics, [geometry]) for geometry in scene.geometries]
+    found = [ball(kinematics, (geometry.name,), body) for geometry in scene.geometries for body in scene.bodies]
+    found += [capsule(kinematics, (geometry.name,)) for geometry in scene.geometries]
     return [volume for volume in found if volume is not None]
 
 
@@ -100,10 +100,10 @@ def test_the_ball_of_one_or_two_joints_is_the_least_about_its_axis(seed, place):
     scene = tree(seed)
     kinematics, rng = Kinematics.of(scene), np.random.default_rng(place)
     ways = [(g, body) for g in scene.geometries for body in kinematics.ancestors(g.body) if 1 <= len(kinematics.chain(body, g.body)) <= 2]
-    ways = [(g, body) for g, body in ways if ball(kinematics, [g], body) is not None]
+    ways = [(g, body) for g, body in ways if ball(kinematics, (g.name,), body) is not None]
     assume(ways)
     geometry, body = ways[rng.integers(len(ways))]
-    found, chain = ball(kinematics, [geometry], body), kinematics.chain(body, geometry.body)
+    found, chain = ball(kinematics, (geometry.name,), body), kinematics.chain(body, geometry.body)
     q = np.zeros((180 ** len(chain), scene.n))
     q[:, chain] = np.stack(np.meshgrid(*[np.linspace(-np.pi, np.pi, 180, endpoint=False) + 1e-3] * len(chain)), axis=-1).reshape(len(q), -1)
     points = kinematics.points(body, geometry.body, geometry.vertices, np.tan((q - scene.q_star) / 2)).reshape(-1, 3)
@@ -214,7 +214,7 @@ def test_axes_that_meet_cost_nothing(body):
     assert holds(scene, Volume(names, body, center, 0.5 + 1e-12))
     refused(scene, Volume(names, body, center, 0.5 - 1e-9), "arm/hand/ball may leave")
     assert holds(scene, Volume(names[1:], body, center, 0.45 + 1e-12))
-    found = ball(Kinematics.of(scene), scene.geometries, body)
+    found = ball(Kinematics.of(scene), tuple(geometry.name for geometry in scene.geometries), body)
     assert found is not None
     assert found.radius == pytest.approx(0.5, abs=1e-8)
     np.testing.assert_allclose(found.vertices, center, atol=1e-8)
@@ -234,20 +234,20 @@ def test_what_slides_or_is_fixed_or_is_on_another_branch_has_no_coarse_volume():
     hand = scene.geometry("arm/hand/ball")
     for body in (WORLD, "arm/a"):
         refused(scene, Volume((hand.name,), body, np.zeros((1, 3)), 100.0), "revolute")
-        assert ball(Kinematics.of(scene), [hand], body) is None
+        assert ball(Kinematics.of(scene), (hand.name,), body) is None
     for body in ("arm/hand", "arm/finger"):
         fixed = Volume((hand.name,), body, np.zeros((1, 3)), 100.0)
         check_volume(scene, ExactKinematics.at(scene, []), fixed)
         refused(scene, fixed, "revolute")
-        assert ball(Kinematics.of(scene), [hand], body) is None
-    assert ball(Kinematics.of(scene), [hand], "arm/b") is not None
+        assert ball(Kinematics.of(scene), (hand.name,), body) is None
+    assert ball(Kinematics.of(scene), (hand.name,), "arm/b") is not None
     slides = planar_arm(1, kind=JointKind.PRISMATIC)
-    assert capsule(Kinematics.of(slides), [slides.geometry("arm/link1/bar")]) is None
-    assert capsule(Kinematics.of(arm()), [arm().geometry("world/obstacle")]) is None
+    assert capsule(Kinematics.of(slides), ("arm/link1/bar",)) is None
+    assert capsule(Kinematics.of(arm()), ("world/obstacle",)) is None
     joints = [replace(joint, parent=WORLD) for joint in arm().joints]
     branches = replace(arm(), joints=tuple(joints))
     refused(branches, bar([[0.0, 0.0, 0.0]], "arm/link1", 100.0), "revolute")
-    assert ball(Kinematics.of(branches), [branches.geometry("arm/link2/bar")], "arm/link1") is None
+    assert ball(Kinematics.of(branches), ("arm/link2/bar",), "arm/link1") is None
 
 
 def test_a_coarse_volume_makes_sense():

@@ -57,7 +57,7 @@ def coarse_proof(scene, first: str, second: str, frame: str, mid, half, **least)
 
 def coarse_volume(scene, name: str, body: str) -> Volume | None:
     kinematics, geometry = Kinematics.of(scene), scene.geometry(name)
-    return ball_about(kinematics, [geometry], body) if body != "capsule" else capsule(kinematics, [geometry])
+    return ball_about(kinematics, (geometry.name,), body) if body != "capsule" else capsule(kinematics, (geometry.name,))
 
 
 def with_tip():
