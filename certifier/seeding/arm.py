@@ -20,7 +20,9 @@ def arm() -> Scene:
     outwards[0, 3] = 0.2
     turns = JointKind.REVOLUTE
     bodies = (WORLD, *(f"arm/link{i}" for i in range(JOINTS)))
-    joints = tuple(Joint(f"arm/joint{i}", turns, bodies[i], bodies[i + 1], axes[i % 2], outwards, eye, i, -LIMIT, LIMIT) for i in range(JOINTS))
+    joints = tuple(
+        Joint(f"arm/joint{i}", turns, bodies[i], bodies[i + 1], axes[i % 2], outwards, eye, i, -LIMIT, LIMIT) for i in range(JOINTS)
+    )
     box = np.array([[x, y, z] for x in (0.1, 0.2) for y in (-0.05, 0.05) for z in (-0.05, 0.05)])
     geometries = (
         Geometry("arm/box", bodies[-1], box, 0.0, {}),
