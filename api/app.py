@@ -5,12 +5,13 @@ from __future__ import annotations
 import logging
 from collections.abc import AsyncIterator, MutableMapping
 from contextlib import asynccontextmanager
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 from anyio import to_thread
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI
 from fastapi.routing import APIRoute
+from starlette.routing import BaseRoute
 
 from api import delivery, document, guard, login, problems
 from api.access import Keyring
@@ -81,10 +82,10 @@ def create_app(db: Database | None = None) -> FastAPI:
         description=DESCRIPTION,
         docs_url=None,
         redoc_url=None,
-        generate_unique_id_function=_operation_id,
         separate_input_output_schemas=False,
         lifespan=_lifespan,
         telemetry={"metrics": False, "logs": False, "operation_spans": False, "exclude": _untraced},
+        routes=_routes(),
     )
     app.state.database = db or database()
     app.state.requests = Requests(settings().requests_file)
@@ -118,16 +119,23 @@ def create_app(db: Database | None = None) -> FastAPI:
     )
     app.add_middleware(AccessLog, requests=app.state.requests)
     problems.install(app, render_problem)
+    app.openapi = partial(document.describe, app)  # type: ignore[method-assign]
+    return app
+
+
+@cache
+def _routes() -> list[BaseRoute]:
+    """Returns the routes of every application of this process: FastAPI takes longer to prepare them than most requests take."""
+    routes = APIRouter(generate_unique_id_function=_operation_id)
     for module in (
         *(scenes, jobs, results, webhooks, events, regions, cells, planning, plans, drawing, motions),
         *(project, projects, inventory, workers, service),
     ):
-        app.include_router(module.router, dependencies=[KNOWN])
-    app.include_router(events.project, dependencies=[KNOWN])
-    app.include_router(login.router)
-    site.install(app)
-    app.openapi = partial(document.describe, app)  # type: ignore[method-assign]
-    return app
+        routes.include_router(module.router, dependencies=[KNOWN])
+    routes.include_router(events.project, dependencies=[KNOWN])
+    routes.include_router(login.router)
+    site.install(routes)
+    return routes.routes
 
 
 @asynccontextmanager

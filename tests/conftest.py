@@ -43,8 +43,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadFil
 
 
 ROOMS = Path(__file__).parent
-WAITING = ("workers", "client", "docs", "benchmarks")
-"""Rooms whose tests wait for processes."""
+WAITING = ("workers", "docs", "client", "benchmarks")
+"""Rooms whose tests wait for processes, those first whose files take longest: what begins last must not take long."""
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -66,8 +66,8 @@ def mix_waiting_and_computing(items: list[pytest.Item]) -> None:
     files: dict[Path, list[pytest.Item]] = {}
     for item in items:
         files.setdefault(item.path, []).append(item)
-    kinds: dict[bool, list[Path]] = {True: [], False: []}
-    for file in files:
-        kinds[file.relative_to(ROOMS).parts[0] in WAITING].append(file)
-    place = {file: (i + 0.5) / len(kind) for kind in kinds.values() for i, file in enumerate(kind)}
+    rooms = {file: file.relative_to(ROOMS).parts[0] for file in files}
+    waiting = sorted((file for file in files if rooms[file] in WAITING), key=lambda file: WAITING.index(rooms[file]))
+    kinds = (waiting, [file for file in files if rooms[file] not in WAITING])
+    place = {file: (i + 0.5) / len(kind) for kind in kinds for i, file in enumerate(kind)}
     items[:] = [item for file in sorted(files, key=place.__getitem__) for item in files[file]]

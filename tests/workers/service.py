@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -126,15 +126,17 @@ class Service:
 
 
 @contextmanager
-def running_service(database_url: str, queue_url: str, logs: Path, **variables: str) -> Iterator[Service]:
-    """A control worker and two solving processes."""
+def running_service(
+    database_url: str, queue_url: str, logs: Path, workers: Sequence[str] = ("control", "solve"), **variables: str
+) -> Iterator[Service]:
+    """A control worker and two solving processes, which take half a minute of a processor's time to start; or some of these workers."""
     given = {"CIRIS_DATABASE_URL": database_url, "CIRIS_REDIS_URL": queue_url, "CIRIS_SOLVE_PROCESSES": "2", "CIRIS_SWEEP_SECONDS": "0.5"}
     given["CIRIS_HEARTBEAT_FILE"] = str(logs / "alive")
     with environment(**{**given, **variables}):
         service = Service(logs)
         try:
-            service.start("control")
-            service.start("solve")
+            for name in workers:
+                service.start(name)
             yield service
         finally:
             service.stop()

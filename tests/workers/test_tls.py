@@ -32,7 +32,7 @@ def test_a_service_works_with_a_password_and_tls_on_both_links(planar: Scene, po
         url += f"?sslmode=verify-full&sslrootcert={own.pem}"
         migrate.upgrade(url)
         broker = f"rediss://:{PASSWORD}@localhost:{queue_port}/0?ssl_ca_certs={own.pem}"
-        with running_service(url, broker, tmp_path) as service:
+        with running_service(url, broker, tmp_path, CIRIS_SOLVE_PROCESSES="1") as service:
             assert ended(submit(planar, box_around(np.zeros(2), 0.1))).state == JobState.SUCCEEDED
             assert PASSWORD not in service.log()
 

@@ -472,7 +472,7 @@ def test_names_that_do_not_resolve_are_an_error_of_the_receiver() -> None:
 def test_the_running_service_delivers(receiver: Receiver, sqlite_url: str, queue: object, tmp_path: Path) -> None:
     from tests.workers.service import running_service
 
-    with running_service(sqlite_url, queue.url, tmp_path, CIRIS_WEBHOOK_HOSTS=receiver.host):  # type: ignore[attr-defined]
+    with running_service(sqlite_url, queue.url, tmp_path, ["control"], CIRIS_WEBHOOK_HOSTS=receiver.host):  # type: ignore[attr-defined]
         job_id = a_webhook(receiver.url)
         eventually(lambda: row_of(job_id).state == "delivered", "the webhook is delivered")
     assert len(receiver.bodies) == 1
