@@ -8,6 +8,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from api.schemas.planning import REGION, SCENE, Q, RegionId
 from certifier.model import JointKind
+from certifier.scene.drawn import MOST_DRAWN, MOST_MESHES, MOST_READ
 from jobs.fields import Positions, Real, Request, SceneName, integer
 
 MAX_CONTACTS, MAX_SIZE, MAX_REGIONS, MAX_SAMPLES = 100, 200, 200, 500
@@ -83,6 +84,32 @@ class SceneModel(BaseModel):
     pairs: list[tuple[int, int]] = Field(description="Indices of the geometries of every pair to certify, in the order of the pairs.")
     zones: list[DrawnZone] = Field(description="The zones in which geometries have to stay.")
     cones: list[DrawnCone] = Field(description="The cones in which directions of bodies have to stay.")
+    has_meshes: bool = Field(description="Whether the models' own meshes were kept; `GET /v1/scenes/{id}/meshes` returns them.")
+
+
+class DrawnMesh(BaseModel):
+    """Describes a collision mesh as its file has it. It is what a certified body stands for, and nothing is proved about it."""
+
+    geometry: str = Field(examples=["arm/upper/bar"], description="Name of the collision geometry in the model.")
+    body: str = Field(description="Name of the body that it is fixed to.")
+    vertices: list[list[float]] = Field(description="(k, 3), metres, in the frame of the body, rounded to micrometres.")
+    triangles: list[list[int]] = Field(description="(t, 3), corners of the triangles, by their places in `vertices`.")
+
+
+class SceneMeshes(BaseModel):
+    """Holds the collision meshes of a scene's models, to be drawn beside the bodies that are certified."""
+
+    scene: SceneId
+    meshes: list[DrawnMesh] = Field(
+        description=f"The meshes, of at most {MOST_DRAWN} triangles together. None where the models have no mesh, where they have more than "
+        f"{MOST_MESHES} meshes or {MOST_READ} triangles, and where the scene was added before the service kept meshes."
+    )
+    triangles: int = Field(description="Number of triangles that the meshes have in their files.", examples=[12480])
+    moved: float = Field(
+        description="How far a vertex is from where its file has it, at most, in metres. It is above 0 where meshes were made coarser, to have "
+        "few enough triangles.",
+        examples=[0.0],
+    )
 
 
 class ContactsRequest(Request):

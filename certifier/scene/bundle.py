@@ -13,7 +13,7 @@ import tempfile
 import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from certifier.errors import CirisError, SceneError
 from certifier.isolation.child import prepare
@@ -104,8 +104,20 @@ def expect_bundles() -> None:
     prepare(_READER)
 
 
-def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Scene:
-    """Returns the scene in a bundle from a stranger. A child process unpacks it within limits, checks it and parses it.
+@dataclass(frozen=True)
+class Bundled:
+    """What a bundle holds.
+
+    Attributes:
+        meshes: the meshes of its models, to be drawn, as :func:`certifier.scene.drawn.document` returns them; None where it has none.
+    """
+
+    scene: Scene
+    meshes: dict[str, Any] | None
+
+
+def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Bundled:
+    """Returns what a bundle from a stranger holds. A child process unpacks it within limits, checks it and parses it.
 
     Raises:
         SceneError: ``bundle_too_large``, ``bundle_zip``, ``bundle_choice``, ``bundle_path``, ``bundle_file``, ``bundle_uri``,
@@ -125,7 +137,8 @@ def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Scene:
         payload = {"archive": str(archive), "root": str(root), "limits": asdict(limits)}
         try:
             seconds = limits.seconds(len(data))
-            return Scene.from_document(read_in_child(_READER, payload, "the bundle", seconds, limits.memory_bytes, str(own)))
+            found = read_in_child(_READER, payload, "the bundle", seconds, limits.memory_bytes, str(own))
+            return Bundled(Scene.from_document(found["scene"]), found["meshes"])
         except CirisError as error:
             error.message = error.message.replace(f"{root}/", "")
             raise

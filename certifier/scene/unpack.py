@@ -8,12 +8,11 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from certifier.errors import SceneError
-from certifier.model import Scene
 from certifier.scene.bundle import INDEX, SMALLER, BundleLimits
 from certifier.scene.draft import draft
 from certifier.scene.file import read_scene_file
 from certifier.scene.macros import in_xacro
-from certifier.scene.parse import parse
+from certifier.scene.parse import parse_with_meshes
 from certifier.scene.references import is_mjcf, is_read, references, resolve
 from certifier.scene.robot import MODELS, keep_only, only_scene, packages_in
 
@@ -26,7 +25,7 @@ _LITTER = {"__MACOSX", ".DS_Store"}
 
 
 def parse_bundle(payload: dict[str, Any]) -> dict[str, Any]:
-    """Returns the document of the bundle's Scene. Drake sees the files once they have passed.
+    """Returns the document of the bundle's ``scene``, and its ``meshes`` to be drawn. Drake sees the files once they have passed.
 
     Raises:
         SceneError: as :func:`certifier.scene.bundle.load_bundle` says.
@@ -35,13 +34,14 @@ def parse_bundle(payload: dict[str, Any]) -> dict[str, Any]:
     limits = BundleLimits(**payload["limits"])
     found = root / unpack(Path(payload["archive"]), root, limits)
     if found.is_file() and (found.suffix in MODELS or is_mjcf(found)):
-        return _drafted(root, found, limits).to_document()
-    check_bundle(root, found)
-    return parse({"path": str(found)})
+        found = _drafted(root, found, limits)
+    else:
+        check_bundle(root, found)
+    return parse_with_meshes(found)
 
 
-def _drafted(root: Path, model: Path, limits: BundleLimits) -> Scene:
-    """Returns the scene of a robot's model that came without one, as ``ciris scene init`` drafts it.
+def _drafted(root: Path, model: Path, limits: BundleLimits) -> Path:
+    """Returns the scene file of a robot's model that came without one, as ``ciris scene init`` drafts it.
 
     Drake sees the model once it has passed with a scene file that has nothing but the model.
     """
@@ -52,7 +52,8 @@ def _drafted(root: Path, model: Path, limits: BundleLimits) -> Scene:
     besides = {"packages": {name: path.relative_to(root).as_posix() for name, path in packages.items() if path.is_relative_to(root)}}
     scene.write_text(json.dumps({"name": "draft", "directives": [directive], **(besides if packages else {})}), encoding="utf-8")
     check_bundle(root, scene)
-    return draft(model, [], scene, packages).scene
+    scene.write_text(draft(model, [], scene, packages).text, encoding="utf-8")
+    return scene
 
 
 def check_bundle(root: Path, scene: Path) -> None:

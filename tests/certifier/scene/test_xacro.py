@@ -40,7 +40,7 @@ def test_the_service_loads_the_same_scene_without_xacro(tmp_path):
     extra = "packages: {parts: parts}\nxacro:\n  size: 0.3\n"
     path = scene(tmp_path, more=more, extra=extra, files={"parts/part.xacro": part})
     data = pack_bundle(path)
-    assert load_bundle(data).hash == load_scene(path).hash
+    assert load_bundle(data).scene.hash == load_scene(path).hash
     with zipfile.ZipFile(BytesIO(data)) as archive:
         texts = {name: archive.read(name).decode() for name in archive.namelist()}
     assert "xacro:include" not in texts["arm.urdf"]
