@@ -232,7 +232,7 @@ def record(client: TestClient, database: Database) -> dict[str, Any]:
     ask("POST", "/v1/jobs/cancel", {"labels": {"batch": "7"}})
     ask("GET", "/v1/events", params={"limit": 3})
     ask("POST", "/v1/jobs", {"kind": "recertify", "scene": name, "region": grown["region"]})
-    for part in ("", "/lint", "/model", "/pairs", "/dependents"):
+    for part in ("", "/lint", "/model", "/meshes", "/pairs", "/dependents"):
         ask("GET", f"/v1/scenes/{{scene_id}}{part}", scene_id=name)
     for part in ("", "/webhook", "/pairs", "/pairs/states", "/events", "/growth", "/timeline", "/obstacles", "/workers", "/dependents"):
         for job in (grown, other):

@@ -47,7 +47,7 @@ def test_the_meshes_of_a_model_are_drawn_in_the_bodies_that_are_certified(arm: A
     ((hull, opaque, colour),) = drawn(arm, 1)
     assert opaque == 1
     meshes.check()
-    arm.get_by_text("Grey: the collision meshes of the model. The proofs are about the certified bodies, which contain them.").wait_for()
+    arm.get_by_text("Grey: the model's collision meshes. Proofs are about the certified bodies, which contain them.").wait_for()
     both = drawn(arm, 2)
     assert {count for count, _, _ in both} == {hull, 20}
     assert all(opacity < 1 for _, opacity, _ in both), "one is seen through the other"

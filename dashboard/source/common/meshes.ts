@@ -4,7 +4,7 @@ import type { Matrix } from "./kinematics";
 import { toMatrix4 } from "./matrix";
 import type { DrawnMesh, SceneMeshes } from "./schema";
 
-const OPACITY = 0.75;
+const OPACITY = 0.85;
 
 function shapeOf({ vertices, triangles }: DrawnMesh): three.BufferGeometry {
   const corners = triangles.flatMap((triangle) => triangle.flatMap((i) => vertices[i]!));

@@ -106,7 +106,7 @@ function Shown({ model, view }: { model: SceneModel; view: { current: View | nul
 function about({ meshes, triangles, moved }: SceneMeshes): string {
   if (meshes.length === 0) return `The meshes of the model have ${triangles.toLocaleString("en")} triangles, which are too many to draw.`;
   const coarser = moved > 0 ? ` They are drawn coarser: points are up to ${rounded(1000 * moved)} mm from where they are in the files.` : "";
-  return `Grey: the collision meshes of the model. The proofs are about the certified bodies, which contain them.${coarser}`;
+  return `Grey: the model's collision meshes. Proofs are about the certified bodies, which contain them.${coarser}`;
 }
 
 /** Two digits, rounded up. */
