@@ -135,7 +135,7 @@ def test_a_small_region_is_not_said_to_be_nothing(page: Any, url: str, planar: S
 
     page.route("**/v1/planning/slice", answer)
     page.goto(f"{url}/scenes/planar")
-    page.get_by_text("less than 1 % of this slice is certified").first.wait_for()
+    page.get_by_text("less than 1 % of this slice is in certified regions").first.wait_for()
 
 
 def test_a_proposal_tells_its_progress_beside_a_settled_iteration(

@@ -18,7 +18,7 @@ from jobs.registry import KINDS
         ("certify", None, "Getting ready to certify."),
         ("recertify", None, "Getting ready to certify."),
         ("certify-path", None, "Certifying the motion."),
-        ("map", None, "Drawing configurations."),
+        ("map", None, "Taking samples of the configurations."),
         ("map", "62.1 % of the free configurations proved, 5 cells", "62.1 % of the free configurations proved, 5 cells."),
         ("cover", "region 0: proposing, 40 s", "Region 0: proposing, 40 s."),
         ("cover", None, ""),

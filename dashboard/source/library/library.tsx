@@ -17,8 +17,8 @@ import { Upload } from "./upload";
 
 const ASK_AGAIN_MS = 1500;
 
-/** `known`: how many regions the scene had when the page was made. */
-export function LibraryIsland({ scene, known }: { scene: string; known: number }) {
+/** `known` and `mapped`: how many regions the scene had when the page was made, and whether it had a map. */
+export function LibraryIsland({ scene, known, mapped }: { scene: string; known: number; mapped: boolean }) {
   const [model, setModel] = useState<SceneModel | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
   useEffect(() => {
@@ -26,10 +26,10 @@ export function LibraryIsland({ scene, known }: { scene: string; known: number }
   }, [scene]);
   if (problem) return <p class="notice bad">The scene cannot be drawn: {problem}</p>;
   if (!model) return <p class="empty">Loading the robot …</p>;
-  return <Library model={model} known={known} />;
+  return <Library model={model} known={known} mapped={mapped} />;
 }
 
-function Library({ model, known }: { model: SceneModel; known: number }) {
+function Library({ model, known, mapped }: { model: SceneModel; known: number; mapped: boolean }) {
   const names = useMemo(() => positions(model), [model]);
   const space: Space = useMemo(() => ({ joints: names, revolute: model.units.map((unit) => unit === "rad"), q_star: model.q_star, q_lower: model.q_lower, q_upper: model.q_upper }), [model]);
   const [q, setQ] = useState(model.q_star.map((value, i) => Math.min(Math.max(value, model.q_lower[i]!), model.q_upper[i]!)));
@@ -92,7 +92,7 @@ function Library({ model, known }: { model: SceneModel; known: number }) {
           <Sliders names={names} units={model.units} lower={model.q_lower} upper={model.q_upper} q={q} onChange={setQ} />
         </div>
         <div>
-          <Slice scene={model.scene} space={space} units={model.units} q={q} onPick={setQ} strongest={chosen} way={motion?.q} />
+          <Slice scene={model.scene} space={space} units={model.units} q={q} onPick={setQ} strongest={chosen} way={motion?.q} mapped={mapped} />
         <section aria-labelledby="h-graph">
           <h2 id="h-graph">Connected regions</h2>
           {graphProblem && <p class="notice bad">{graphProblem}</p>}
