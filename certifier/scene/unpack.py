@@ -11,10 +11,11 @@ from certifier.errors import SceneError
 from certifier.scene.bundle import INDEX, SMALLER, BundleLimits
 from certifier.scene.draft import draft
 from certifier.scene.file import read_scene_file
-from certifier.scene.macros import in_xacro
+from certifier.scene.macros import XACRO, in_xacro
 from certifier.scene.parse import parse_with_meshes
 from certifier.scene.references import is_mjcf, is_read, references, resolve
 from certifier.scene.robot import MODELS, keep_only, only_scene, packages_in
+from certifier.scene.strange_xacro import put, to_expand
 
 _DEPTH = 32
 _BELOW = "keep the file below the directory of the model"
@@ -27,13 +28,20 @@ _LITTER = {"__MACOSX", ".DS_Store"}
 def parse_bundle(payload: dict[str, Any]) -> dict[str, Any]:
     """Returns the document of the bundle's ``scene``, and its ``meshes`` to be drawn. Drake sees the files once they have passed.
 
+    Where models are written in xacro, it returns what is to ``expand`` first, and is then called again, with the expansions.
+
     Raises:
         SceneError: as :func:`certifier.scene.bundle.load_bundle` says.
     """
     root = Path(payload["root"])
     limits = BundleLimits(**payload["limits"])
-    found = root / unpack(Path(payload["archive"]), root, limits)
-    if found.is_file() and (found.suffix in MODELS or is_mjcf(found)):
+    found = root / (payload.get("scene") or unpack(Path(payload["archive"]), root, limits))
+    alone = found.is_file() and (found.suffix in (*MODELS, XACRO) or is_mjcf(found))
+    if "expanded" in payload:
+        put(found, payload["expanded"], alone=alone)
+    elif wanted := to_expand(root, found, alone=alone):
+        return {"scene": str(found.relative_to(root)), "expand": wanted}
+    if alone:
         found = _drafted(root, found, limits)
     else:
         check_bundle(root, found)
@@ -45,7 +53,7 @@ def _drafted(root: Path, model: Path, limits: BundleLimits) -> Path:
 
     Drake sees the model once it has passed with a scene file that has nothing but the model.
     """
-    scene = root / f"{model.stem}.yaml"
+    scene = root / f"{(Path(model.stem) if model.suffix == XACRO else model).stem}.yaml"
     packages = packages_in(model, root, limits)
     keep_only(model, root, packages)
     directive = {"add_model": {"name": "model", "file": model.relative_to(root).as_posix()}}
@@ -88,7 +96,7 @@ def _needed(file: Path, root: Path, packages: dict[str, Path]) -> list[Path]:
     """
     where = file.relative_to(root).as_posix()
     if in_xacro(file, where):
-        message = f"{where} is written in xacro, and a bundle has its expansion"
+        message = f"{where} is written in xacro, and only models that the scene file names are expanded"
         raise SceneError("bundle_file", message, hint="make the bundle with `ciris scene add`, which expands it")
     found = []
     for reference in references(file):

@@ -24,8 +24,7 @@ BUNDLES: Table = {
     ],
     ("bundle_file", ""): [
         lambda t: t.stranger(arm__urdf="<robot><mesh filename='run.sh'/></robot>", run__sh="true"),
-        lambda t: t.stranger(arm__urdf=XACRO),
-        lambda t: t.unpack(("arm.urdf", XACRO)),
+        lambda t: t.stranger(other__urdf=XACRO),
     ],
     ("bundle_text", ""): [lambda t: t.stranger(m__gltf=b"\xff\xfe"), lambda t: t.stranger(m__gltf="{"), lambda t: t.stranger(m__gltf="[]")],
     ("bundle_uri", ""): [
