@@ -101,13 +101,13 @@ class SceneMeshes(BaseModel):
 
     scene: SceneId
     meshes: list[DrawnMesh] = Field(
-        description=f"The meshes, of at most {MOST_DRAWN} triangles together. None where the models have no mesh, where they have more than "
-        f"{MOST_MESHES} meshes or {MOST_READ} triangles, and where the scene was added before the service kept meshes."
+        description=f"The meshes, of at most {MOST_DRAWN} triangles together. None where the models have no mesh, where they have more "
+        f"than {MOST_MESHES} meshes or {MOST_READ} triangles, and where the scene was added before the service kept meshes."
     )
     triangles: int = Field(description="Number of triangles that the meshes have in their files.", examples=[12480])
     moved: float = Field(
-        description="How far a vertex is from where its file has it, at most, in metres. It is above 0 where meshes were made coarser, to have "
-        "few enough triangles.",
+        description="How far a vertex is from where its file has it, at most, in metres. It is above 0 where meshes were made coarser, "
+        "to have few enough triangles.",
         examples=[0.0],
     )
 

@@ -55,8 +55,8 @@ class Placed:
 def document(placed: Sequence[Placed]) -> dict[str, Any] | None:
     """Returns the meshes as JSON-able data, within the limits; None where there is no mesh.
 
-    ``meshes`` have a ``geometry``, a ``body``, ``vertices`` (k, 3) in the frame of the body, metres, and ``triangles`` (t, 3), the numbers of
-    their vertices. There are none where the models have too many or too large ones. ``triangles`` says how many the models have, and
+    ``meshes`` have a ``geometry``, a ``body``, ``vertices`` (k, 3) in the frame of the body, metres, and ``triangles`` (t, 3), the numbers
+    of their vertices. There are none where the models have too many or too large ones. ``triangles`` says how many the models have, and
     ``moved`` how far a point is drawn from where its file has it, at most, in metres.
     """
     count = sum(len(one.mesh.triangles) for one in placed)

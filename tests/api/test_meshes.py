@@ -26,8 +26,9 @@ CORNER = (
 )
 """A solid like an L, of 20 triangles. Its hull closes the corner."""
 MODEL = """<robot name="arm"><link name="base"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
-<link name="tip"><collision><origin xyz="0.5 0 0" rpy="0 0 1.5707963267948966"/><geometry><mesh filename="link.obj" scale="2 1 1"/></geometry>
-</collision></link><joint name="turn" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
+<link name="tip"><collision><origin xyz="0.5 0 0" rpy="0 0 1.5707963267948966"/>
+<geometry><mesh filename="link.obj" scale="2 1 1"/></geometry></collision></link>
+<joint name="turn" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
 <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
 
 

@@ -60,7 +60,14 @@ def views(browser: Browser, url: str, ids: dict[str, str]) -> None:
     shoot(browser, f"{url}{planned}", "dashboard_scene_dark", "text=/component/", planning, scheme="dark")
     shoot(browser, f"{url}/regions/{ids['region']}", "dashboard_region", "text=of this slice is in certified regions")
     shoot(browser, f"{url}/regions/{ids['region']}", "dashboard_region_phone", "text=of this slice is in certified regions", size=PHONE)
-    shoot(browser, f"{url}/regions/{ids['region']}", "dashboard_plane", "text=of this slice is in certified regions", plane, part=".explore .views")
+    shoot(
+        browser,
+        f"{url}/regions/{ids['region']}",
+        "dashboard_plane",
+        "text=of this slice is in certified regions",
+        plane,
+        part=".explore .views",
+    )
     shoot(
         browser,
         f"{url}/compare?a={ids['region']}&b={ids['smaller']}",

@@ -423,7 +423,7 @@ def test_the_first_contact_of_a_path_is_shown(page: Any, url: str, planar: Scene
     assert shown(page) == pytest.approx(np.rad2deg(stop["q"]), abs=0.06)
     assert f"with {stop['a']} and {stop['b']} painted" in page.locator(".robot canvas").get_attribute("aria-label")
     assert [part.get_attribute("class") for part in page.locator(".parts li").all()] == ["motion", "nothing"]
-    assert "1 in q" in page.locator(".upload").text_content()
+    assert "1 radian or metre a second" in page.locator(".upload").text_content()
     time = page.get_by_label("Time, seconds")
     time.focus()
     time.press("End")

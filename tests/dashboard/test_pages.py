@@ -269,3 +269,32 @@ def test_the_list_of_jobs_says_which_filter_was_meant(client: TestClient) -> Non
     answer = client.get("/?sate=failed", headers={"Accept": "text/html"})
     assert "state" in answer.text.partition("</h1>")[2]
     assert client.get("/?state=failed&kind=&scene=&outcome=&key=&search=").status_code == 200
+
+
+def test_words_of_the_trade_say_what_they_mean(client: TestClient, database: Database, region: str, scene: Scene) -> None:
+    assert 'class="badge exact" title="The verifier has checked every proof in exact arithmetic."' in client.get(f"/regions/{region}").text
+    job = motion_job(
+        database,
+        scene,
+        {"outcome": "refuted", "stop": None, "certified_to": None, "clearance": None, "proved_distance": None, "margin": None},
+    )
+    text = client.get(f"/jobs/{job}").text
+    assert 'class="badge refuted" title="Bodies touch, at a configuration that is shown."' in text
+
+
+def test_a_kind_of_job_has_one_name_on_all_pages(client: TestClient, database: Database, scene: Scene) -> None:
+    begun = {"piece": 0, "time": 0.25, "q": [0.0]}
+    verdict = {"outcome": "certified", "stop": None, "certified_to": begun, "proved_distance": 0.01, "clearance": 0.02, "tube": None}
+    job = motion_job(database, scene, verdict)
+    assert "Certify a motion of" in client.get(f"/jobs/{job}").text
+    listed = client.get("/").text
+    assert "<td>certify a motion</td>" in listed
+    assert '<option value="certify-path">certify a motion</option>' in listed
+
+
+def test_a_tube_is_said_to_be_no_wider_than_it_is(client: TestClient, database: Database, scene: Scene) -> None:
+    """The joint of the scene slides, so the tube is in metres, too."""
+    begun = {"piece": 0, "time": 0.25, "q": [0.0]}
+    verdict = {"outcome": "certified", "stop": None, "certified_to": begun, "proved_distance": 0.01, "clearance": 0.02, "tube": 0.0123999}
+    text = claim_of(client.get(f"/jobs/{motion_job(database, scene, verdict)}").text)
+    assert "off by up to 0.71° (0.0123 rad), or by 0.0123 m where it slides" in text

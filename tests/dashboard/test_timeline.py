@@ -63,7 +63,8 @@ def test_the_page_of_a_map_says_what_is_proved_of_each_path(page: Any, url: str,
     offered = page.get_by_label("Show events").locator("option").all_text_contents()
     assert {"everything", "the job", "steps", "progress"} <= {*offered}
     assert {"iterations", "pairs", "regions", "the cover"}.isdisjoint(offered), "a map has none of these"
-    page.route(f"**/v1/jobs/{job}/map", lambda route: route.fulfill(json=client.get(f"/v1/jobs/{job}/map").json() | {"curve": [[1, 0], [2, 1]]}))
+    whole = client.get(f"/v1/jobs/{job}/map").json() | {"curve": [[1, 0], [2, 1]]}
+    page.route(f"**/v1/jobs/{job}/map", lambda route: route.fulfill(json=whole))
     page.reload()
     page.locator(".share svg text", has_text="100 %").wait_for()
     chart, label = page.locator(".share svg").bounding_box(), page.locator(".share svg text", has_text="100 %").bounding_box()

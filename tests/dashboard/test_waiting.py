@@ -13,8 +13,8 @@ from jobs.registry import KINDS
 @pytest.mark.parametrize(
     ("kind", "note", "said"),
     [
-        ("grow", None, "Seeding: looking for a starting region around the seed."),
-        ("grow", "proposing, 40 s, 31 faces", "Seeding: looking for a starting region around the seed (proposing, 40 s, 31 faces)."),
+        ("grow", None, "Looking for a starting region around the seed."),
+        ("grow", "proposing, 40 s, 31 faces", "Looking for a starting region around the seed (proposing, 40 s, 31 faces)."),
         ("certify", None, "Getting ready to certify."),
         ("recertify", None, "Getting ready to certify."),
         ("certify-path", None, "Certifying the motion."),

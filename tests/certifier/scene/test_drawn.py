@@ -20,7 +20,7 @@ def ball(rings: int) -> Mesh:
     a = (along[:-1, None] * round_ + np.arange(round_)).ravel()
     b = (along[:-1, None] * round_ + (np.arange(round_) + 1) % round_).ravel()
     triangles = np.concatenate([np.column_stack([a, a + round_, b]), np.column_stack([b, a + round_, b + round_])])
-    return Mesh(points + [10, 0, 0], triangles)
+    return Mesh(points + np.array([10, 0, 0]), triangles)
 
 
 def placed(mesh: Mesh) -> Placed:
@@ -56,7 +56,7 @@ def test_points_that_no_triangle_has_are_left_out() -> None:
 
 
 def test_more_than_can_be_looked_at_is_only_counted() -> None:
-    one = Mesh(np.eye(3), np.zeros((MOST_READ + 1, 3), dtype=np.int64) + [0, 1, 2])
+    one = Mesh(np.eye(3), np.tile([0, 1, 2], (MOST_READ + 1, 1)))
     assert document([placed(one)]) == {"meshes": [], "triangles": MOST_READ + 1, "moved": 0.0}
     several = [placed(replace(one, triangles=one.triangles[:1]))] * (MOST_MESHES + 1)
     assert document(several) == {"meshes": [], "triangles": MOST_MESHES + 1, "moved": 0.0}
@@ -64,7 +64,7 @@ def test_more_than_can_be_looked_at_is_only_counted() -> None:
 
 def test_triangles_without_an_area_end() -> None:
     """No cell is large enough for them, and all of them go."""
-    nowhere = Mesh(np.zeros((3, 3)), np.zeros((MOST_DRAWN + 1, 3), dtype=np.int64) + [0, 1, 2])
+    nowhere = Mesh(np.zeros((3, 3)), np.tile([0, 1, 2], (MOST_DRAWN + 1, 1)))
     found = document([placed(nowhere)])
     assert found is not None
     assert found["meshes"] == []
