@@ -8,7 +8,6 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from api.schemas.planning import REGION, SCENE, Q, RegionId
 from certifier.model import JointKind
-from certifier.scene.drawn import MOST_DRAWN, MOST_MESHES, MOST_READ
 from jobs.fields import Positions, Real, Request, SceneName, integer
 
 MAX_CONTACTS, MAX_SIZE, MAX_REGIONS, MAX_SAMPLES = 100, 200, 200, 500
@@ -91,9 +90,14 @@ class DrawnMesh(BaseModel):
     """Describes a collision mesh as its file has it. It is what a certified body stands for, and nothing is proved about it."""
 
     geometry: str = Field(examples=["arm/upper/bar"], description="Name of the collision geometry in the model.")
-    body: str = Field(description="Name of the body that it is fixed to.")
-    vertices: list[list[float]] = Field(description="(k, 3), metres, in the frame of the body, rounded to micrometres.")
-    triangles: list[list[int]] = Field(description="(t, 3), corners of the triangles, by their places in `vertices`.")
+    body: str = Field(examples=["arm/upper"], description="Name of the body that it is fixed to.")
+    vertices: list[list[float]] = Field(
+        examples=[[[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.1, 0.0]]],
+        description="(k, 3), metres, in the frame of the body, rounded to micrometres.",
+    )
+    triangles: list[list[int]] = Field(
+        examples=[[[0, 1, 2]]], description="(t, 3), corners of the triangles, by their places in `vertices`."
+    )
 
 
 class SceneMeshes(BaseModel):
@@ -101,8 +105,8 @@ class SceneMeshes(BaseModel):
 
     scene: SceneId
     meshes: list[DrawnMesh] = Field(
-        description=f"The meshes, of at most {MOST_DRAWN} triangles together. None where the models have no mesh, where they have more "
-        f"than {MOST_MESHES} meshes or {MOST_READ} triangles, and where the scene was added before the service kept meshes."
+        description="The meshes, with few enough triangles to be drawn. None where the models have no mesh, where they have far too many "
+        "triangles, and where the scene was added before the service kept meshes."
     )
     triangles: int = Field(description="Number of triangles that the meshes have in their files.", examples=[12480])
     moved: float = Field(

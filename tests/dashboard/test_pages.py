@@ -297,4 +297,4 @@ def test_a_tube_is_said_to_be_no_wider_than_it_is(client: TestClient, database: 
     begun = {"piece": 0, "time": 0.25, "q": [0.0]}
     verdict = {"outcome": "certified", "stop": None, "certified_to": begun, "proved_distance": 0.01, "clearance": 0.02, "tube": 0.0123999}
     text = claim_of(client.get(f"/jobs/{motion_job(database, scene, verdict)}").text)
-    assert "off by up to 0.71° (0.0123 rad), or by 0.0123 m where it slides" in text
+    assert "off by up to 0.710° (0.0123 rad), or by 0.0123 m where it slides" in text
