@@ -40,7 +40,7 @@ BUNDLES: Table = {
     ("bundle_zip", "bundle"): [
         lambda t: load_bundle(b"not a zip"),
         lambda t: t.unpack(("LICENSE", "all")),
-        lambda t: t.unpack(("arm.urdf.xacro", "<robot/>")),
+        lambda t: t.unpack(("arm_macro.xacro", "<robot/>")),
     ],
     ("bundle_choice", "bundle"): [lambda t: t.unpack(("a/scene.yaml", ""), ("b/scene.yaml", ""))],
     ("scene_package", ""): [lambda t: t.unpack(("arm.urdf", "<robot name='a'><mesh filename='package://no/m.obj'/></robot>"))],
