@@ -43,7 +43,7 @@ KEPT = 64
 """Number of collision maps that an API process keeps, those that were asked for last."""
 
 
-def model(scene_id: str, scene: Scene) -> SceneModel:
+def model(scene_id: str, scene: Scene, has_meshes: bool) -> SceneModel:
     """Returns the scene as it is drawn."""
     index = {geometry.name: i for i, geometry in enumerate(scene.geometries)}
     return SceneModel(
@@ -75,6 +75,7 @@ def model(scene_id: str, scene: Scene) -> SceneModel:
         pairs=[(index[pair.a], index[pair.b]) for pair in scene.pairs],
         zones=[_zone(scene, condition) for condition in scene.conditions if isinstance(condition, Inside | InBall)],
         cones=[_cone(condition) for condition in scene.conditions if isinstance(condition, Cone)],
+        has_meshes=has_meshes,
     )
 
 

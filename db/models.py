@@ -87,6 +87,16 @@ class SceneRow(Owned, Base):
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
 
 
+class SceneMeshesRow(Base):
+    """The meshes of a scene's models, for people to look at (db.meshes)."""
+
+    __tablename__ = "scene_meshes"
+
+    scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id", ondelete="CASCADE"), primary_key=True)
+    data: Mapped[bytes]
+    """Compressed JSON: what certifier.scene.drawn.document() returns."""
+
+
 class SceneNameRow(Owned, Base):
     """A version of a name in a project. The name means the scene of its last version. ``NAME@staged`` is a name, too (db.staging)."""
 

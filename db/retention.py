@@ -25,6 +25,7 @@ from db.models import (
     ProofRow,
     QuestionRow,
     RegionRow,
+    SceneMeshesRow,
     SceneNameRow,
     SceneRow,
     StepRow,
@@ -180,13 +181,15 @@ def _bytes(session: Session, mine: Select[str]) -> int:
 
 
 def stored(session: Session, project: str) -> int:
-    """Returns how many bytes of scenes, jobs, proofs, cells and motions a project stores."""
+    """Returns how many bytes of scenes, their meshes, jobs, proofs, cells and motions a project stores."""
     documents = select(func.sum(func.length(cast(SceneRow.document, Text)))).where(SceneRow.project == project)
+    drawn = select(func.sum(func.length(SceneMeshesRow.data))).join(SceneRow).where(SceneRow.project == project)
     moved = select(func.sum(func.length(MotionRow.arrays) + func.length(ProofRow.data)))
     moved = moved.join(ProofRow, ProofRow.digest == MotionRow.proof_digest).where(MotionRow.project == project)
     asked = select(func.sum(JobRow.bytes)).where(JobRow.project == project)
     return (
         int(session.scalar(documents) or 0)
+        + int(session.scalar(drawn) or 0)
         + int(session.scalar(asked) or 0)
         + int(session.scalar(moved) or 0)
         + _bytes(session, select(JobRow.id).where(JobRow.project == project))

@@ -91,7 +91,7 @@ class Account:
     @property
     def said(self) -> str:
         """Returns the account in words."""
-        return f"{100 * self.coverage:.1f} % of the free configurations proved, {self.cells} cells"
+        return f"{self.cells} cells proved, with about {100 * self.coverage:.1f} % of the free configurations, as samples say"
 
 
 NOTHING = Account(0.0, 1.0, 0, 0, 0, 0.0)

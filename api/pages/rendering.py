@@ -15,7 +15,7 @@ from fastapi.templating import Jinja2Templates
 
 import dashboard
 from api import problems
-from certifier.verify.decimals import at_least_mm, at_most_mm
+from certifier.verify.decimals import at_least_degrees, at_least_mm, at_most_mm, rounded_down
 
 ROOT = Path(dashboard.__file__).parent
 _SECURITY = {
@@ -38,9 +38,43 @@ def stage(label: str) -> str:
     return _STAGES.get(label, label)
 
 
+_KINDS = {"certify-path": "certify a motion", "certify": "certify a polytope", "recertify": "certify a region again"}
+
+
+def kind_in_words(kind: str) -> str:
+    """Returns what a kind of job does, in the words of the form; the other kinds are such words."""
+    return _KINDS.get(kind, kind)
+
+
+_MEANINGS = {
+    "certified": "The bodies are apart, and the verifier has accepted the proof.",
+    "refuted": "Bodies touch, at a configuration that is shown.",
+    "not_certifiable": "It is proved that no certificate of this kind exists. The bodies may be apart all the same.",
+    "too_close": "The bodies are so close that no plane was found between them.",
+    "inconclusive": "The search ended without an answer.",
+    "error": "It could not be computed.",
+    "exact": "The verifier has checked every proof in exact arithmetic.",
+    "numeric": "Proofs were found, and not checked in exact arithmetic.",
+    "sampled": "Samples say so. Nothing is proved.",
+    "none": "Nothing is proved.",
+}
+
+
+def meaning(word: str) -> str:
+    """Returns what an outcome or a guarantee means, in a sentence; empty for another word."""
+    return _MEANINGS.get(word, "")
+
+
 templates = Jinja2Templates(ROOT / "templates")
-templates.env.filters |= {"at_least_mm": at_least_mm, "at_most_mm": at_most_mm, "powers": powers, "stage": stage}
-templates.env.filters |= {"degrees": math.degrees, "radians": math.radians}
+templates.env.filters |= {
+    "at_least_mm": at_least_mm,
+    "at_most_mm": at_most_mm,
+    "powers": powers,
+    "stage": stage,
+    "kind_in_words": kind_in_words,
+}
+templates.env.filters |= {"degrees": math.degrees, "radians": math.radians, "meaning": meaning}
+templates.env.filters |= {"at_least_degrees": at_least_degrees, "rounded_down": rounded_down}
 
 
 def page(request: Request, name: str, context: dict[str, Any], status: int = 200) -> Response:

@@ -13,6 +13,7 @@ from api.parameters import KNOWN_TO_PAGE
 from api.routers import regions, scenes
 from api.schemas.common import Cursor
 from api.schemas.scenes import SceneSummary
+from db import jobs, maps
 from db import scenes as known_scenes
 from db.regions import counts as region_counts
 from jobs import patterns
@@ -46,12 +47,15 @@ def scene_page(request: Request, scene_id: str, db: Db) -> Response:
     newest = regions.get_region(found[0].id, db) if found else None
     with db.read() as session:
         number = region_counts(session, [scene.id])[scene.id]
+        latest = maps.latest(session, scene.id)
+        mapped = None if latest is None else {"job": latest, "at": jobs.get(session, latest).finished_at}
     context = {
         "scene": scene,
         "lint": scenes.get_scene_lint(scene_id, db),
         "pairs": scenes.get_scene_pairs(scene_id, db).pairs,
         "regions": found,
         "number": number,
+        "map": mapped,
         "others": [other for other in scenes.list_scenes(db, limit=100).scenes if other.id != scene.id],
         "newest": newest,
         "distance": newest and min((pair["margin"] for pair in newest.manifest["pairs"] if pair["margin"] is not None), default=None),

@@ -18,7 +18,7 @@ from api.delivery import unchanging
 from api.reading import ReadingRoute
 from api.room import KeptRoom, Room
 from api.schemas.common import Cursor, Listed, SceneGiven, WithDependents
-from api.schemas.drawing import SceneModel
+from api.schemas.drawing import SceneMeshes, SceneModel
 from api.schemas.scenes import (
     ConstrainRequest,
     IgnoredPair,
@@ -37,10 +37,10 @@ from certifier.errors import SceneError
 from certifier.model import Scene
 from certifier.names import MAX_NAME
 from certifier.pair.forecast import forecast
-from certifier.scene.bundle import BundleLimits, load_bundle
+from certifier.scene.bundle import Bundled, BundleLimits, load_bundle
 from certifier.scene.conditions import constrained, read_conditions, swept_in
 from certifier.verify import uncovered
-from db import audit, machine, retention, scenes, staging
+from db import audit, machine, meshes, retention, scenes, staging
 from db.audit import Action
 from db.models import Document, SceneRow
 from db.scenes import STAGED
@@ -94,16 +94,19 @@ async def create_scene(
 
 def _add_scene(db: Database, room: Room, project: str, file: BinaryIO, stage: str | None) -> SceneDetail:
     room.check(db, project)
-    scene = _read(file.read())
+    bundled = _read(file.read())
+    scene = bundled.scene
     besides = uncovered.document(scene)
     with db.write() as session:
         row = scenes.add(session, scene) if stage is None else staging.stage(session, stage, scene)
+        if bundled.meshes is not None:
+            meshes.keep(session, row.id, bundled.meshes)
         return _detail(session, row, row.name if stage is None else row.name + STAGED, scene, besides)
 
 
 @cached(LRUCache(KEPT), key=lambda data: hashlib.sha256(data).digest(), lock=Lock())
-def _read(data: bytes) -> Scene:
-    """Returns the scene in a bundle. Equal bundles hold equal scenes, and a child process reads each once."""
+def _read(data: bytes) -> Bundled:
+    """Returns what a bundle holds. Equal bundles hold equal scenes, and a child process reads each once."""
     most = BundleLimits()
     memory = min(most.memory_bytes, machine.memory_bytes() // (AT_ONCE + 1))
     return load_bundle(data, replace(most, memory_bytes=memory))
@@ -142,7 +145,21 @@ def get_scene_model(scene_id: SceneGiven, db: Db) -> SceneModel:
     """Returns the scene as it is drawn: its kinematic tree, and the convex bodies that are certified."""
     with db.read() as session:
         found = scenes.find(session, scene_id)
-    return drawing.model(found, scenes.load(db, found))
+        has_meshes = meshes.has(session, found)
+    return drawing.model(found, scenes.load(db, found), has_meshes)
+
+
+@router.get("/{scene_id}/meshes")
+@unchanging
+def get_scene_meshes(scene_id: SceneGiven, db: Db) -> SceneMeshes:
+    """Returns the collision meshes of the scene's models as their files have them, to see how far a certified body reaches beyond its mesh.
+
+    They are for looking at, and no proof is about them. `GET /v1/scenes/{id}/model` has the bodies that are certified.
+    """
+    with db.read() as session:
+        found = scenes.find(session, scene_id)
+        document = meshes.of(session, found)
+    return SceneMeshes(scene=found, **(document or {"meshes": [], "triangles": 0, "moved": 0.0}))
 
 
 @router.get("/{scene_id}/pairs")
@@ -214,6 +231,7 @@ def _constrain(db: Database, room: Room, project: str, scene_id: str, body: Cons
     besides = uncovered.document(scene)
     with db.write() as session:
         row = scenes.add(session, scene)
+        meshes.hand_on(session, found, row.id)
         return _detail(session, row, body.name, scene, besides)
 
 

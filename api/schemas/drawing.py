@@ -83,6 +83,37 @@ class SceneModel(BaseModel):
     pairs: list[tuple[int, int]] = Field(description="Indices of the geometries of every pair to certify, in the order of the pairs.")
     zones: list[DrawnZone] = Field(description="The zones in which geometries have to stay.")
     cones: list[DrawnCone] = Field(description="The cones in which directions of bodies have to stay.")
+    has_meshes: bool = Field(description="Whether the models' own meshes were kept; `GET /v1/scenes/{id}/meshes` returns them.")
+
+
+class DrawnMesh(BaseModel):
+    """Describes a collision mesh as its file has it. It is what a certified body stands for, and nothing is proved about it."""
+
+    geometry: str = Field(examples=["arm/upper/bar"], description="Name of the collision geometry in the model.")
+    body: str = Field(examples=["arm/upper"], description="Name of the body that it is fixed to.")
+    vertices: list[list[float]] = Field(
+        examples=[[[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.1, 0.0]]],
+        description="(k, 3), metres, in the frame of the body, rounded to micrometres.",
+    )
+    triangles: list[list[int]] = Field(
+        examples=[[[0, 1, 2]]], description="(t, 3), corners of the triangles, by their places in `vertices`."
+    )
+
+
+class SceneMeshes(BaseModel):
+    """Holds the collision meshes of a scene's models, to be drawn beside the bodies that are certified."""
+
+    scene: SceneId
+    meshes: list[DrawnMesh] = Field(
+        description="The meshes, with few enough triangles to be drawn. None where the models have no mesh, where they have far too many "
+        "triangles, and where the scene was added before the service kept meshes."
+    )
+    triangles: int = Field(description="Number of triangles that the meshes have in their files.", examples=[12480])
+    moved: float = Field(
+        description="How far a vertex is from where its file has it, at most, in metres. It is above 0 where meshes were made coarser, "
+        "to have few enough triangles.",
+        examples=[0.0],
+    )
 
 
 class ContactsRequest(Request):

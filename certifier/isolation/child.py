@@ -97,7 +97,7 @@ def run_in_child(
     try:
         status, answer = nursery.ask(encode(call), timeout_s, kept, tell)
     except TimeoutError:
-        message = f"it took more than {timeout_s:g} s and was stopped{nursery.tail()}"
+        message = f"it took more than {float(format(timeout_s, '.3g')):g} s and was stopped{nursery.tail()}"
         raise CirisError("child_timeout", message, hint="ask for less, or try again when the machine has less to do") from None
     except (EOFError, ConnectionError):
         raise _death(nursery.process.returncode, nursery.tail(), memory_bytes) from None

@@ -13,13 +13,14 @@ import tempfile
 import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from certifier.errors import CirisError, SceneError
 from certifier.isolation.child import prepare
+from certifier.isolation.confinement import probed
 from certifier.scene.file import existing, for_bundle, read_scene_file
 from certifier.scene.load import read_in_child
-from certifier.scene.macros import Expander, in_xacro
+from certifier.scene.macros import EXPAND, MEMORY_BYTES, TIMEOUT_S, Expander, in_xacro
 from certifier.scene.references import is_mjcf, mjcf_references, references, resolve
 
 if TYPE_CHECKING:  # The command packs bundles without numpy, which the model needs.
@@ -104,8 +105,20 @@ def expect_bundles() -> None:
     prepare(_READER)
 
 
-def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Scene:
-    """Returns the scene in a bundle from a stranger. A child process unpacks it within limits, checks it and parses it.
+@dataclass(frozen=True)
+class Bundled:
+    """What a bundle holds.
+
+    Attributes:
+        meshes: the meshes of its models, to be drawn, as :func:`certifier.scene.drawn.document` returns them; None where it has none.
+    """
+
+    scene: Scene
+    meshes: dict[str, Any] | None
+
+
+def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Bundled:
+    """Returns what a bundle from a stranger holds. A child process unpacks it within limits, checks it and parses it.
 
     Raises:
         SceneError: ``bundle_too_large``, ``bundle_zip``, ``bundle_choice``, ``bundle_path``, ``bundle_file``, ``bundle_uri``,
@@ -125,10 +138,29 @@ def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Scene:
         payload = {"archive": str(archive), "root": str(root), "limits": asdict(limits)}
         try:
             seconds = limits.seconds(len(data))
-            return Scene.from_document(read_in_child(_READER, payload, "the bundle", seconds, limits.memory_bytes, str(own)))
+            found = read_in_child(_READER, payload, "the bundle", seconds, limits.memory_bytes, str(own))
+            if "expand" in found:
+                expanded = {one["path"]: _expanded(one, str(own)) for one in found["expand"]}
+                again = {**payload, "scene": found["scene"], "expanded": expanded}
+                found = read_in_child(_READER, again, "the bundle", seconds, limits.memory_bytes, str(own))
+            return Bundled(Scene.from_document(found["scene"]), found["meshes"])
         except CirisError as error:
             error.message = error.message.replace(f"{root}/", "")
             raise
+
+
+def _expanded(wanted: dict[str, Any], own: str) -> dict[str, Any]:
+    """Returns the expansion of a stranger's model in xacro, from a process that the kernel confines. What xacro evaluates is Python.
+
+    Raises:
+        SceneError: ``scene_xacro``, or ``scene_model_crash``; ``bundle_file`` where the kernel confines no process.
+    """
+    name, layers = Path(wanted["path"]).name, probed()
+    if not (layers.landlock and layers.seccomp):
+        message = f"{name} is written in xacro, and this machine cannot keep a stranger's xacro from its files and its network"
+        hint = f"expand it, as `xacro {name} > robot.urdf` does, or use `ciris scene init` and `ciris scene add`, which expand it"
+        raise SceneError("bundle_file", message, hint=hint)
+    return read_in_child(EXPAND, wanted, name, TIMEOUT_S, MEMORY_BYTES, own)
 
 
 def _write(archive: zipfile.ZipFile, name: str, content: bytes) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
+from typing import Any
 from xml.parsers import expat
 
 from certifier.errors import SceneError, close_matches
+from certifier.isolation.confinement import alone
 from certifier.scene.load import read_in_child
 from certifier.scene.xml import parse_xml
 
@@ -18,7 +20,8 @@ _NAMESPACE = "xmlns:xacro"
 _FIND = re.compile(r"\$\(find\s+([\w.-]+)\s*\)")
 _INCLUDE = re.compile(r"<xacro:include\s[^>]*filename\s*=\s*[\"']([^\"']+)")
 _MAX_BYTES = 2**24
-_TIMEOUT_S, _MEMORY_BYTES = 30.0, 2**30
+EXPAND = "certifier.scene.expansion:expand"
+TIMEOUT_S, MEMORY_BYTES = 30.0, 2**30
 Argument = str | int | float | bool
 
 
@@ -78,6 +81,34 @@ def packages_named(path: Path, find: Callable[[str], Path | None]) -> dict[str, 
     return found
 
 
+def request(path: Path, root: Path, packages: Mapping[str, Path], arguments: Mapping[str, Argument]) -> dict[str, Any]:
+    """Returns what :func:`certifier.scene.expansion.expand` is asked about a model.
+
+    Args:
+        root: directory of the scene file.
+    """
+    return {
+        "path": str(path),
+        "root": str(root),
+        "packages": {package: str(place) for package, place in packages.items()},
+        "arguments": {key: _written(value) for key, value in arguments.items()},
+        "bytes": _MAX_BYTES,
+    }
+
+
+def check_declared(arguments: Mapping[str, Argument], declared: Collection[str]) -> None:
+    """Checks that some file declares each argument.
+
+    Raises:
+        SceneError: ``scene_xacro``.
+    """
+    for name in arguments:
+        if name not in declared:
+            known = sorted(declared)
+            hint = close_matches(name, known) or f"arguments of the models: {', '.join(known) or 'none'}"
+            raise SceneError("scene_xacro", f"no model has an argument {name[:80]!a}", field=f"xacro.{name}", hint=hint)
+
+
 class Expander:
     """Expands the models of one scene, each once."""
 
@@ -94,17 +125,15 @@ class Expander:
             name: the file's name for people.
 
         Raises:
-            SceneError: ``scene_xacro`` for what xacro refuses; ``scene_model_crash`` if expanding takes too long or too much memory.
+            SceneError: ``scene_xacro`` for what xacro refuses; ``scene_model_crash`` if expanding takes too long or too much memory;
+                ``bundle_file`` in a process that may start no other: what xacro evaluates would run in it.
         """
+        if alone():
+            message = f"{name} is written in xacro, and only models that the scene file names are expanded"
+            raise SceneError("bundle_file", message, hint="make the bundle with `ciris scene add`, which expands all of them")
         if path not in self._texts:
-            payload = {
-                "path": str(path),
-                "root": str(self._root),
-                "packages": {package: str(root) for package, root in self._packages.items()},
-                "arguments": {key: _written(value) for key, value in self._arguments.items()},
-                "bytes": _MAX_BYTES,
-            }
-            found = read_in_child("certifier.scene.expansion:expand", payload, name, _TIMEOUT_S, _MEMORY_BYTES)
+            payload = request(path, self._root, self._packages, self._arguments)
+            found = read_in_child(EXPAND, payload, name, TIMEOUT_S, MEMORY_BYTES)
             self._texts[path] = found["text"].encode()
             self._declared |= {*found["declared"]}
         return self._texts[path]
@@ -115,11 +144,7 @@ class Expander:
         Raises:
             SceneError: ``scene_xacro``.
         """
-        for name in self._arguments:
-            if name not in self._declared:
-                known = sorted(self._declared)
-                hint = close_matches(name, known) or f"arguments of the models: {', '.join(known) or 'none'}"
-                raise SceneError("scene_xacro", f"no model has an argument {name[:80]!a}", field=f"xacro.{name}", hint=hint)
+        check_declared(self._arguments, self._declared)
 
 
 def _written(value: Argument) -> str:

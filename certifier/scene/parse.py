@@ -46,12 +46,13 @@ from certifier.errors import SceneError
 from certifier.model import Array, Geometry, Joint, JointKind, Scene
 from certifier.names import MAX_SENTENCE, escaped
 from certifier.positions import MAGNITUDE
-from certifier.scene import following, shapes
+from certifier.scene import drawn, following, shapes
 from certifier.scene.census import check_counts
 from certifier.scene.conditions import constrained
 from certifier.scene.configurations import own_configurations, srdf_configurations
 from certifier.scene.copies import Copies
 from certifier.scene.decomposition.parts import Decomposition
+from certifier.scene.drawn import Placed
 from certifier.scene.file import SceneFile, read_scene_file
 from certifier.scene.hollow import recorded
 from certifier.scene.hulls import with_hulls
@@ -85,11 +86,22 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
         SceneError: whatever is wrong with the file, the models it names or the scene they make.
     """
     with tempfile.TemporaryDirectory(dir=payload.get("scratch"), prefix="ciris-") as scratch:
-        return _parsed(Path(payload["path"]), Path(scratch))
+        return _parsed(Path(payload["path"]), Path(scratch))[0]
 
 
-def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
-    """Does the work of :func:`parse`; ``scratch`` is an empty directory."""
+def parse_with_meshes(path: Path) -> dict[str, Any]:
+    """Returns the document of the ``scene`` that a file describes, and its ``meshes`` to be drawn (:func:`certifier.scene.drawn.document`).
+
+    Raises:
+        SceneError: as :func:`parse`.
+    """
+    with tempfile.TemporaryDirectory(prefix="ciris-") as scratch:
+        scene, placed = _parsed(path, Path(scratch))
+        return {"scene": scene, "meshes": drawn.document(placed)}
+
+
+def _parsed(path: Path, scratch: Path) -> tuple[dict[str, Any], list[Placed]]:
+    """Returns the document of a Scene, and the meshes of its models; ``scratch`` is an empty directory."""
     scene_file = read_scene_file(path)
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
@@ -148,7 +160,7 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
     )
     following.check_ways(scene)
     check_counts(written, inspector.NumGeometriesWithRole(Role.kProximity), scene)
-    drawn = {names.body(plant.GetBodyFromFrameId(inspector.GetFrameId(i))) for i in inspector.GetAllGeometryIds(Role.kIllustration)}
+    shown = {names.body(plant.GetBodyFromFrameId(inspector.GetFrameId(i))) for i in inspector.GetAllGeometryIds(Role.kIllustration)}
     states, left_out = srdf_configurations(scene, semantics, at, followers)
     files = {entry.reason: one.file for one in semantics for entry in one.ignore}
     named = replace(scene, configurations=states | own_configurations(scene, scene_file.configurations))
@@ -161,9 +173,9 @@ def _parsed(path: Path, scratch: Path) -> dict[str, Any]:
         + unused
         + without
         + left_out
-        + findings(scene, tree, candidates, drawn, files)
+        + findings(scene, tree, candidates, shown, files)
     )
-    return document
+    return document, _placed_meshes(strict, copies, plant, inspector, names)
 
 
 def _at_rest(coupled: list[Coupling]) -> list[str]:
@@ -367,6 +379,20 @@ def _placed(name: str, body: str, convex: shapes.Body, X_BG: RigidTransform) -> 
     vertices = np.ascontiguousarray((X_BG @ convex.vertices.T).T)
     shape = {**convex.shape, "X_BG": X_BG.GetAsMatrix4().tolist()}
     return Geometry(name, body, vertices, convex.radius, shape, convex.substitution, convex.inflation)
+
+
+def _placed_meshes(
+    strict: StrictReader, copies: Copies, plant: MultibodyPlant, inspector: SceneGraphInspector, names: Names
+) -> list[Placed]:
+    """Returns the meshes of the proximity role."""
+    found = []
+    for i in inspector.GetAllGeometryIds(Role.kProximity):
+        shape = inspector.GetShape(i)
+        if isinstance(shape, Convex | Mesh):
+            mesh = strict.taken(copies.original(shape.source().path()))
+            body = names.body(plant.GetBodyFromFrameId(inspector.GetFrameId(i)))
+            found.append(Placed(names.geometry(i), body, mesh, shape.scale3(), inspector.GetPoseInFrame(i).GetAsMatrix4()))
+    return found
 
 
 def _check_hull(geometry: Geometry) -> None:

@@ -13,7 +13,6 @@ from certifier.errors import SceneError
 from certifier.names import escaped
 from certifier.scene.bundle import BundleLimits
 from certifier.scene.draft import beside_model
-from certifier.scene.macros import in_xacro
 from certifier.scene.packages import packages_of, places_of, taken_from
 from certifier.scene.references import is_mjcf, mjcf_references, references, resolve
 
@@ -21,6 +20,8 @@ SCENE_FILE = "scene.yaml"
 """A zip without an index has its scene in this file."""
 MODELS = (".urdf", ".sdf", ".mjcf")
 """A zip without a scene file is taken for the robot whose model it has."""
+_IN_XACRO = (".urdf.xacro", ".sdf.xacro")
+"""Without one of these, it is taken for that whose model in xacro it has. Macros for such models have other names."""
 _XML = ".xml"
 """MuJoCo's models mostly end so, and much else does."""
 _DIRECTIVES = re.compile(rb"""(?:^|[\s{,])["']?directives["']?\s*:""")
@@ -40,8 +41,8 @@ def only_scene(root: Path) -> str:
     found = [file for file in written if file.name == SCENE_FILE] or [file for file in written if _DIRECTIVES.search(file.read_bytes())]
     found = found or _models(root) or (written if len(written) == 1 else [])
     if not found and any(root.rglob("*.xacro")):
-        hint = "expand the xacro, as `xacro FILE > robot.urdf` does, or use `ciris scene init` and `ciris scene add`, which expand it"
-        raise SceneError("bundle_zip", "the zip has no scene file, and no model of a robot but in xacro", field="bundle", hint=hint)
+        hint = f"give the robot's model a name that ends in {' or '.join(_IN_XACRO)}, or name it in bundle.json"
+        raise SceneError("bundle_zip", "the zip has no scene file, and no model of a robot but macros in xacro", field="bundle", hint=hint)
     if not found:
         hint = f"add a {SCENE_FILE}, or a robot's model: {', '.join(MODELS)}"
         raise SceneError("bundle_zip", "the zip has no scene file, and no model of a robot", field="bundle", hint=hint)
@@ -58,6 +59,7 @@ def _models(root: Path) -> list[Path]:
     """Returns the models, of the first kind that there is. One that another of them includes is a part of that one."""
     found = next((some for kind in MODELS if (some := list(root.rglob(f"*{kind}")))), [])
     found = found or [file for file in root.rglob(f"*{_XML}") if _MUJOCO.search(file.read_bytes())]
+    found = found or [file for kind in _IN_XACRO for file in root.rglob(f"*{kind}")]
     parts = {(file.parent / reference).resolve() for file in found for reference in references(file) if "://" not in reference}
     return [file for file in found if file.resolve() not in parts] or found
 
@@ -69,12 +71,8 @@ def packages_in(model: Path, root: Path, limits: BundleLimits) -> dict[str, Path
     from it. Where that begins below the package's own directory, the files are copied into such directories.
 
     Raises:
-        SceneError: ``scene_package``; ``bundle_file`` for a model that is written in xacro, which is not expanded here;
-            ``bundle_too_large`` where the copies would have more bytes or files than a zip may have.
+        SceneError: ``scene_package``; ``bundle_too_large`` where the copies would have more bytes or files than a zip may have.
     """
-    if in_xacro(model, model.name):
-        hint = f"expand it, as `xacro {model.name} > robot.urdf` does, or use `ciris scene init` and `ciris scene add`, which expand it"
-        raise SceneError("bundle_file", f"{model.name} is written in xacro, which the service does not run", hint=hint)
     given: dict[str, Path] = {}
     copies = _Copies(root, limits.unpacked_bytes, limits.files)
     for name, files in taken_from(model).items():

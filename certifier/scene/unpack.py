@@ -8,14 +8,14 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from certifier.errors import SceneError
-from certifier.model import Scene
 from certifier.scene.bundle import INDEX, SMALLER, BundleLimits
 from certifier.scene.draft import draft
 from certifier.scene.file import read_scene_file
-from certifier.scene.macros import in_xacro
-from certifier.scene.parse import parse
+from certifier.scene.macros import XACRO, in_xacro
+from certifier.scene.parse import parse_with_meshes
 from certifier.scene.references import is_mjcf, is_read, references, resolve
 from certifier.scene.robot import MODELS, keep_only, only_scene, packages_in
+from certifier.scene.strange_xacro import put, to_expand
 
 _DEPTH = 32
 _BELOW = "keep the file below the directory of the model"
@@ -26,33 +26,42 @@ _LITTER = {"__MACOSX", ".DS_Store"}
 
 
 def parse_bundle(payload: dict[str, Any]) -> dict[str, Any]:
-    """Returns the document of the bundle's Scene. Drake sees the files once they have passed.
+    """Returns the document of the bundle's ``scene``, and its ``meshes`` to be drawn. Drake sees the files once they have passed.
+
+    Where models are written in xacro, it returns what is to ``expand`` first, and is then called again, with the expansions.
 
     Raises:
         SceneError: as :func:`certifier.scene.bundle.load_bundle` says.
     """
     root = Path(payload["root"])
     limits = BundleLimits(**payload["limits"])
-    found = root / unpack(Path(payload["archive"]), root, limits)
-    if found.is_file() and (found.suffix in MODELS or is_mjcf(found)):
-        return _drafted(root, found, limits).to_document()
-    check_bundle(root, found)
-    return parse({"path": str(found)})
+    found = root / (payload.get("scene") or unpack(Path(payload["archive"]), root, limits))
+    alone = found.is_file() and (found.suffix in (*MODELS, XACRO) or is_mjcf(found))
+    if "expanded" in payload:
+        put(found, payload["expanded"], alone=alone)
+    elif wanted := to_expand(root, found, alone=alone):
+        return {"scene": str(found.relative_to(root)), "expand": wanted}
+    if alone:
+        found = _drafted(root, found, limits)
+    else:
+        check_bundle(root, found)
+    return parse_with_meshes(found)
 
 
-def _drafted(root: Path, model: Path, limits: BundleLimits) -> Scene:
-    """Returns the scene of a robot's model that came without one, as ``ciris scene init`` drafts it.
+def _drafted(root: Path, model: Path, limits: BundleLimits) -> Path:
+    """Returns the scene file of a robot's model that came without one, as ``ciris scene init`` drafts it.
 
     Drake sees the model once it has passed with a scene file that has nothing but the model.
     """
-    scene = root / f"{model.stem}.yaml"
+    scene = root / f"{(Path(model.stem) if model.suffix == XACRO else model).stem}.yaml"
     packages = packages_in(model, root, limits)
     keep_only(model, root, packages)
     directive = {"add_model": {"name": "model", "file": model.relative_to(root).as_posix()}}
     besides = {"packages": {name: path.relative_to(root).as_posix() for name, path in packages.items() if path.is_relative_to(root)}}
     scene.write_text(json.dumps({"name": "draft", "directives": [directive], **(besides if packages else {})}), encoding="utf-8")
     check_bundle(root, scene)
-    return draft(model, [], scene, packages).scene
+    scene.write_text(draft(model, [], scene, packages).text, encoding="utf-8")
+    return scene
 
 
 def check_bundle(root: Path, scene: Path) -> None:
@@ -87,7 +96,7 @@ def _needed(file: Path, root: Path, packages: dict[str, Path]) -> list[Path]:
     """
     where = file.relative_to(root).as_posix()
     if in_xacro(file, where):
-        message = f"{where} is written in xacro, and a bundle has its expansion"
+        message = f"{where} is written in xacro, and only models that the scene file names are expanded"
         raise SceneError("bundle_file", message, hint="make the bundle with `ciris scene add`, which expands it")
     found = []
     for reference in references(file):

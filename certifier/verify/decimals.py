@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import sys
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
 
@@ -18,6 +20,11 @@ def rounded_up(x: float, digits: int = 3, times: int = 1) -> str:
 def at_least_mm(metres: float) -> str:
     """Returns a lower bound, given in metres, as a text in millimetres that is rounded down."""
     return f"{_plain(rounded_down(metres, times=1000))} mm"
+
+
+def at_least_degrees(radians: float) -> str:
+    """Returns a lower bound, given in radians, as a text in degrees that is rounded down, whatever the conversion rounds."""
+    return f"{rounded_down(math.degrees(radians) * (1 - 4 * sys.float_info.epsilon))}°"
 
 
 def at_most_mm(metres: float) -> str:

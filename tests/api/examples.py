@@ -23,6 +23,7 @@ from db.session import Database
 from db.states import WorkerState
 from db.workers import Made, WorkerKind
 from tests.api.conftest import BASE_URL, working
+from tests.api.test_meshes import CORNER, MODEL, zipped
 from tests.services import queue_server
 from tests.workers.service import environment
 
@@ -266,6 +267,8 @@ def record(client: TestClient, database: Database) -> dict[str, Any]:
     ask("POST", "/v1/planning/contains", {"scene": name, "q": [["a", "b"]]})
     arm = ask("POST", "/v1/scenes", {"bundle": ("scene.zip", pack_bundle(EXAMPLES / "iiwa_shelf" / "scene.yaml"), "application/zip")})
     ask("GET", "/v1/scenes/{scene_id}/lint", scene_id=arm["id"])
+    corner = ask("POST", "/v1/scenes", {"bundle": ("scene.zip", zipped(arm_urdf=MODEL, link_obj=CORNER), "application/zip")})
+    ask("GET", "/v1/scenes/{scene_id}/meshes", scene_id=corner["id"])
     with database.write() as session:
         service.key = keys.add(session, "admin", Scope.ADMIN)  # type: ignore[attr-defined]
         workers.tell(session, made, WorkerState.RUNNING)  # the inventory leaves out who has said nothing for a minute

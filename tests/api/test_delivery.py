@@ -102,6 +102,7 @@ UNCHANGING = {
     "get_region_pairs",
     "get_scene",
     "get_scene_lint",
+    "get_scene_meshes",
     "get_scene_model",
     "get_scene_pairs",
 }

@@ -30,6 +30,7 @@ OPERATIONS = {
     "list_scenes": "GET /v1/scenes",
     "get_scene": "GET /v1/scenes/{scene_id}",
     "get_scene_model": "GET /v1/scenes/{scene_id}/model",
+    "get_scene_meshes": "GET /v1/scenes/{scene_id}/meshes",
     "get_scene_pairs": "GET /v1/scenes/{scene_id}/pairs",
     "get_scene_lint": "GET /v1/scenes/{scene_id}/lint",
     "create_job": "POST /v1/jobs",

@@ -58,14 +58,21 @@ def views(browser: Browser, url: str, ids: dict[str, str]) -> None:
     shoot(browser, f"{url}/new?scene={ids['planar']}&q=0.3,-0.6", "dashboard_new", ".said >> text=/computed|certified/")
     shoot(browser, f"{url}{planned}", "dashboard_scene", "text=/component/", planning)
     shoot(browser, f"{url}{planned}", "dashboard_scene_dark", "text=/component/", planning, scheme="dark")
-    shoot(browser, f"{url}/regions/{ids['region']}", "dashboard_region", "text=of this slice is certified")
-    shoot(browser, f"{url}/regions/{ids['region']}", "dashboard_region_phone", "text=of this slice is certified", size=PHONE)
-    shoot(browser, f"{url}/regions/{ids['region']}", "dashboard_plane", "text=of this slice is certified", plane, part=".explore .views")
+    shoot(browser, f"{url}/regions/{ids['region']}", "dashboard_region", "text=of this slice is in certified regions")
+    shoot(browser, f"{url}/regions/{ids['region']}", "dashboard_region_phone", "text=of this slice is in certified regions", size=PHONE)
+    shoot(
+        browser,
+        f"{url}/regions/{ids['region']}",
+        "dashboard_plane",
+        "text=of this slice is in certified regions",
+        plane,
+        part=".explore .views",
+    )
     shoot(
         browser,
         f"{url}/compare?a={ids['region']}&b={ids['smaller']}",
         "dashboard_compare",
-        "text=of this slice is certified",
+        "text=of this slice is in certified regions",
         part=".slice",
     )
     both = f"{url}/compare/jobs?a={ids['pair']}&b={ids['other']}"

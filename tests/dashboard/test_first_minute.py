@@ -117,11 +117,11 @@ def test_two_robots_without_a_scene_are_refused(client: TestClient, tmp_path: Pa
     assert answer.json()["detail"].endswith("2 files that may be the scene file or the robot's model: one.urdf, two.urdf")
 
 
-def test_a_zip_with_nothing_but_xacro_says_who_expands_it(client: TestClient, tmp_path: Path) -> None:
-    (tmp_path / "arm.urdf.xacro").write_text("<robot/>")
+def test_a_zip_with_nothing_but_macros_says_how_to_name_the_model(client: TestClient, tmp_path: Path) -> None:
+    (tmp_path / "arm_macro.xacro").write_text("<robot/>")
     answer = client.post("/v1/scenes", files={"bundle": ("arm.zip", zipped(tmp_path), "application/zip")}).json()
-    assert answer["detail"] == "the zip has no scene file, and no model of a robot but in xacro"
-    assert "`ciris scene init`" in answer["hint"]
+    assert answer["detail"] == "the zip has no scene file, and no model of a robot but macros in xacro"
+    assert ".urdf.xacro" in answer["hint"]
 
 
 def test_a_zip_without_a_package_that_its_robot_names_says_what_to_put_there(client: TestClient, tmp_path: Path) -> None:

@@ -54,9 +54,9 @@ def test_a_visit_from_a_job_to_a_plan(page: Any, url: str, planar: Scene, client
     # The region, and its slice.
     page.locator("a[href^='/regions/']").first.click()
     page.get_by_text("The robot is inside the region").wait_for()
-    page.get_by_text("of this slice is certified").first.wait_for()
+    page.get_by_text("of this slice is in certified regions").first.wait_for()
     assert page.url.rpartition("/")[2] in regions
-    assert re.search(r"[1-9]\d* % of this slice is certified", page.locator(".slice figcaption").text_content())
+    assert re.search(r"[1-9]\d* % of this slice is in certified regions", page.locator(".slice figcaption").text_content())
 
     # A plan between two configurations in the region, played to its end.
     page.get_by_role("link", name="planar").click()

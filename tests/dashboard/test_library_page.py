@@ -21,6 +21,7 @@ from db import scenes
 from db.session import Database
 from planner.poses.frame import frame_of, pose_at, pose_of
 from tests.api.conftest import certified_polytope, store_region
+from tests.api.test_planning import store_map
 from tests.certifier.scenes import cube, planar_arm
 
 BOXES = [((-0.2, -0.1), 0.1), ((-0.05, -0.1), 0.1), ((-0.5, -0.5), 0.05)]
@@ -114,7 +115,7 @@ def test_a_plan_is_played_to_its_end_with_the_region_of_each_moment(opened: Any,
     assert regions[1][:8] in opened.locator(".moment").text_content()
     assert opened.locator(".player output").text_content() == f"{saved['t'][-1]:.2f} s"
     assert shown(opened) == pytest.approx(np.rad2deg(saved["q"][-1]), abs=0.06)
-    assert "on all of the planned motion, no collision of the covered pairs" in opened.locator(".claim").text_content()
+    assert "on all of the planned motion, no collision of the scene's pairs" in opened.locator(".claim").text_content()
 
 
 def test_the_robot_and_its_player_stay_in_view_while_the_page_scrolls(opened: Any) -> None:
@@ -124,6 +125,21 @@ def test_the_robot_and_its_player_stay_in_view_while_the_page_scrolls(opened: An
     canvas = opened.locator(".robot canvas").bounding_box()
     claim = opened.locator(".claim").bounding_box()
     assert claim["y"] + claim["height"] <= canvas["y"] < canvas["y"] + canvas["height"] <= play.bounding_box()["y"] < 720
+
+
+def test_on_a_phone_the_buttons_of_the_view_are_over_the_robot(opened: Any) -> None:
+    opened.set_viewport_size({"width": 390, "height": 844})
+    robot, front = opened.locator(".robot").bounding_box(), opened.get_by_role("button", name="View: front").bounding_box()
+    assert robot["y"] <= front["y"] <= robot["y"] + robot["height"]
+
+
+def test_the_slice_says_that_it_does_not_draw_the_map(page: Any, url: str, planar_region: str, planar: Scene, database: Database) -> None:
+    page.goto(f"{url}/scenes/planar")
+    page.get_by_text("of this slice is in certified regions").wait_for()
+    assert page.get_by_text("What the map proves is not drawn here.").count() == 0
+    store_map(database, planar, planar_region)
+    page.reload()
+    page.get_by_text("What the map proves is not drawn here.").wait_for()
 
 
 def test_only_the_overlaps_that_the_motion_goes_through_are_marked(page: Any, url: str, regions: list[str]) -> None:
@@ -377,7 +393,7 @@ FREE = [[-0.3, 0.1], [-0.6, 0.4], [-0.9, 0.2]]
     ("name", "text"),
     [
         ("path.json", json.dumps({"q": FREE, "t": [10.0, 10.5, 11.5]})),
-        ("path.csv", "t,j1,j2\r\n" + "".join(f"{t},{a},{b}\r\n" for t, (a, b) in zip((10.0, 10.5, 11.5), FREE, strict=True))),
+        ("path.csv", "t,q1,q2\r\n" + "".join(f"{t},{a},{b}\r\n" for t, (a, b) in zip((10.0, 10.5, 11.5), FREE, strict=True))),
     ],
 )
 def test_a_path_from_a_file_is_certified_and_played(page: Any, url: str, planar: Scene, client: TestClient, name: str, text: str) -> None:
@@ -407,7 +423,7 @@ def test_the_first_contact_of_a_path_is_shown(page: Any, url: str, planar: Scene
     assert shown(page) == pytest.approx(np.rad2deg(stop["q"]), abs=0.06)
     assert f"with {stop['a']} and {stop['b']} painted" in page.locator(".robot canvas").get_attribute("aria-label")
     assert [part.get_attribute("class") for part in page.locator(".parts li").all()] == ["motion", "nothing"]
-    assert "1 in q" in page.locator(".upload").text_content()
+    assert "1 radian or metre a second" in page.locator(".upload").text_content()
     time = page.get_by_label("Time, seconds")
     time.focus()
     time.press("End")
@@ -426,7 +442,9 @@ def test_the_first_contact_of_a_path_is_shown(page: Any, url: str, planar: Scene
         ("path.json", '{"q": [[0, 0], [1, 1]], "t": [1, 1]}', "ascending numbers, one for each waypoint"),
         ("path.json", '{"q": [[0, 0], [1, 1]], "t": [1]}', "ascending numbers, one for each waypoint"),
         ("path.csv", "", "It is empty"),
-        ("path.csv", "s1,s2,t\n0,0,1\n", "so it holds s"),
+        ("path.csv", "s1,s2,t\n0,0,1\n", "Its columns are s"),
+        ("path.csv", "joint2,joint1\n0,0\n0.1,0.2\n", "their names joint2, joint1 are not looked up"),
+        ("path.csv", "shoulder,slide\n0,0\n0.1,0.2\n", "Columns are in the scene's order of joints"),
         ("path.csv", "0,0\n0,x\n", 'In waypoint 1, "x" is no number'),
         ("path.csv", "0,0\n0\n", "Waypoint 1 has 1 numbers, and the first row has 2"),
     ],

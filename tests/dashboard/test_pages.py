@@ -22,6 +22,7 @@ from db import jobs, pairs, regions, scenes, steps
 from db.pairs import NewPair
 from db.session import Database
 from db.states import IterationState, JobState, PairState, StepState
+from tests.api.test_planning import store_map
 from tests.db.builders import add_iteration
 from tests.db.builders import certified as certified_pair
 from tests.scenes import slider
@@ -84,10 +85,36 @@ def test_the_page_of_a_motion_says_what_is_proved_and_what_is_not(client: TestCl
     }
     for words, verdict in said.items():
         text = client.get(f"/jobs/{motion_job(database, scene, verdict)}").text
-        claim = text.partition('<section class="claim')[2].partition("</section>")[0]
+        claim = claim_of(text)
         assert words in claim
-        assert (f"at least {at_least_mm(0.02)}" in claim) == (verdict["clearance"] is not None)
-        assert f"<dd>{2 if verdict['certified_to'] else 0}</dd>" in claim
+        assert (f"at least {at_least_mm(0.02)}" in claim) == (verdict["clearance"] is not None and verdict["certified_to"] is not None)
+        assert ("<dt>Pairs covered</dt><dd>2</dd>" in claim) == (verdict["certified_to"] is not None)
+        text = client.get(f"/jobs/{motion_job(database, scene, verdict)}").text
+        assert "As it is." in text, "a reason is a sentence"
+        assert "growth curve" not in text, "a motion has none"
+
+
+def test_the_claim_of_a_scene_names_its_map(client: TestClient, database: Database, scene: Scene, region: str) -> None:
+    """What a map proves counts beside regions, and alone."""
+    before = claim_of(client.get("/scenes/slider").text)
+    assert "the certified region of this scene" in before
+    job = store_map(database, scene, region)
+    both = claim_of(client.get("/scenes/slider").text)
+    assert f'in the certified region and the proved cells of the <a href="/jobs/{job}">latest map</a> of this scene' in both
+    assert client.delete(f"/v1/regions/{region}").status_code == 204
+    alone = claim_of(client.get("/scenes/slider").text)
+    assert f'Proved:</span> in the proved cells of the <a href="/jobs/{job}">latest map</a> of this scene' in alone
+    assert f"<dt>Pairs covered</dt><dd>{len(scene.pairs)}</dd>" in alone
+
+
+def test_where_nothing_is_proved_no_numbers_are_said(client: TestClient, database: Database) -> None:
+    with database.write() as session:
+        scenes.add(session, slider())
+    assert "<dl>" not in claim_of(client.get("/scenes/slider").text)
+
+
+def claim_of(text: str) -> str:
+    return text.partition('<section class="claim')[2].partition("</section>")[0]
 
 
 def test_names_are_escaped(client: TestClient, database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -242,3 +269,32 @@ def test_the_list_of_jobs_says_which_filter_was_meant(client: TestClient) -> Non
     answer = client.get("/?sate=failed", headers={"Accept": "text/html"})
     assert "state" in answer.text.partition("</h1>")[2]
     assert client.get("/?state=failed&kind=&scene=&outcome=&key=&search=").status_code == 200
+
+
+def test_words_of_the_trade_say_what_they_mean(client: TestClient, database: Database, region: str, scene: Scene) -> None:
+    assert 'class="badge exact" title="The verifier has checked every proof in exact arithmetic."' in client.get(f"/regions/{region}").text
+    job = motion_job(
+        database,
+        scene,
+        {"outcome": "refuted", "stop": None, "certified_to": None, "clearance": None, "proved_distance": None, "margin": None},
+    )
+    text = client.get(f"/jobs/{job}").text
+    assert 'class="badge refuted" title="Bodies touch, at a configuration that is shown."' in text
+
+
+def test_a_kind_of_job_has_one_name_on_all_pages(client: TestClient, database: Database, scene: Scene) -> None:
+    begun = {"piece": 0, "time": 0.25, "q": [0.0]}
+    verdict = {"outcome": "certified", "stop": None, "certified_to": begun, "proved_distance": 0.01, "clearance": 0.02, "tube": None}
+    job = motion_job(database, scene, verdict)
+    assert "Certify a motion of" in client.get(f"/jobs/{job}").text
+    listed = client.get("/").text
+    assert "<td>certify a motion</td>" in listed
+    assert '<option value="certify-path">certify a motion</option>' in listed
+
+
+def test_a_tube_is_said_to_be_no_wider_than_it_is(client: TestClient, database: Database, scene: Scene) -> None:
+    """The joint of the scene slides, so the tube is in metres, too."""
+    begun = {"piece": 0, "time": 0.25, "q": [0.0]}
+    verdict = {"outcome": "certified", "stop": None, "certified_to": begun, "proved_distance": 0.01, "clearance": 0.02, "tube": 0.0123999}
+    text = claim_of(client.get(f"/jobs/{motion_job(database, scene, verdict)}").text)
+    assert "off by up to 0.710° (0.0123 rad), or by 0.0123 m where it slides" in text

@@ -40,7 +40,7 @@ def faces(client: TestClient, planar_region: str) -> tuple[Array, Array]:
 def opened(page: Any, url: str, planar_region: str) -> Any:
     page.goto(f"{url}/regions/{planar_region}")
     page.get_by_text(READY).wait_for()
-    page.get_by_text("of this slice is certified").first.wait_for()
+    page.get_by_text("of this slice is in certified regions").first.wait_for()
     return page
 
 

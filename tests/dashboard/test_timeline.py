@@ -46,7 +46,9 @@ def test_work_is_drawn_over_time_and_told_in_a_table(page: Any, url: str, databa
 
 @pytest.mark.usefixtures("worker")
 def test_the_page_of_a_map_says_what_is_proved_of_each_path(page: Any, url: str, client: TestClient, planar: Scene) -> None:
-    options = {"coverage": 0.3, "paths": [[[-0.3, 0.1], [-0.4, 0.2]], [[-0.2, 0.1], [-0.3, 0.1], [-0.3, 0.2]]]}
+    """Its shares are estimates, and look so; a configuration that it proves looks proved."""
+    page.set_viewport_size({"width": 390, "height": 844})
+    options = {"coverage": 0.3, "at": [[-0.3, 0.1]], "paths": [[[-0.3, 0.1], [-0.4, 0.2]], [[-0.2, 0.1], [-0.3, 0.1], [-0.3, 0.2]]]}
     job = client.post("/v1/jobs", json={"kind": "map", "scene": "planar", "options": options}).json()["id"]
     page.goto(f"{url}/jobs/{job}")
     page.locator(".title .badge.succeeded").wait_for(timeout=60_000)
@@ -55,6 +57,18 @@ def test_the_page_of_a_map_says_what_is_proved_of_each_path(page: Any, url: str,
     assert rows.locator("td:nth-child(2)").all_text_contents() == ["2", "3"]
     shown = [float(text.removesuffix(" %")) for text in rows.locator("td:nth-child(3)").all_text_contents()]
     assert all(100 * share - 0.1 <= said <= 100 * share for said, share in zip(shown, shares, strict=True))
+    page.get_by_role("cell", name="proved free of collision").locator(".proved").wait_for()
+    page.get_by_text("of the free configurations are proved after").locator(".computed").wait_for()
+    page.locator(".log").get_by_text("of the free configurations, as samples say").first.wait_for()
+    offered = page.get_by_label("Show events").locator("option").all_text_contents()
+    assert {"everything", "the job", "steps", "progress"} <= {*offered}
+    assert {"iterations", "pairs", "regions", "the cover"}.isdisjoint(offered), "a map has none of these"
+    whole = client.get(f"/v1/jobs/{job}/map").json() | {"curve": [[1, 0], [2, 1]]}
+    page.route(f"**/v1/jobs/{job}/map", lambda route: route.fulfill(json=whole))
+    page.reload()
+    page.locator(".share svg text", has_text="100 %").wait_for()
+    chart, label = page.locator(".share svg").bounding_box(), page.locator(".share svg text", has_text="100 %").bounding_box()
+    assert label["x"] >= chart["x"]
     page.locator(".log").get_by_text("Putting the proof of the map together and verifying it: done").wait_for()
     assert page.get_by_text("the region's proof").count() == 0
     page.get_by_role("region", name="Work over time", exact=True).scroll_into_view_if_needed()

@@ -48,11 +48,11 @@ def test_nothing_is_said_of_a_configuration_that_was_not_asked_about(page: Any, 
 
 def test_nothing_is_said_of_a_slice_that_is_not_there_yet(page: Any, url: str, planar_region: str) -> None:
     page.goto(f"{url}/scenes/planar")
-    page.get_by_text("of this slice is certified").wait_for()
+    page.get_by_text("of this slice is in certified regions").wait_for()
     page.route("**/v1/planning/slice", lambda route: None)
     page.locator(".slice select").first.select_option(index=1)
     page.get_by_text("Computing …").wait_for()
-    assert page.get_by_text("of this slice is certified").count() == 0
+    assert page.get_by_text("of this slice is in certified regions").count() == 0
 
 
 def test_a_job_is_followed_without_a_stream(page: Any, url: str, database: Database, running: str, complaints: list[str]) -> None:

@@ -13,12 +13,12 @@ from jobs.registry import KINDS
 @pytest.mark.parametrize(
     ("kind", "note", "said"),
     [
-        ("grow", None, "Seeding: looking for a starting region around the seed."),
-        ("grow", "proposing, 40 s, 31 faces", "Seeding: looking for a starting region around the seed (proposing, 40 s, 31 faces)."),
+        ("grow", None, "Looking for a starting region around the seed."),
+        ("grow", "proposing, 40 s, 31 faces", "Looking for a starting region around the seed (proposing, 40 s, 31 faces)."),
         ("certify", None, "Getting ready to certify."),
         ("recertify", None, "Getting ready to certify."),
         ("certify-path", None, "Certifying the motion."),
-        ("map", None, "Drawing configurations."),
+        ("map", None, "Taking samples of the configurations."),
         ("map", "62.1 % of the free configurations proved, 5 cells", "62.1 % of the free configurations proved, 5 cells."),
         ("cover", "region 0: proposing, 40 s", "Region 0: proposing, 40 s."),
         ("cover", None, ""),

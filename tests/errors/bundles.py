@@ -24,8 +24,7 @@ BUNDLES: Table = {
     ],
     ("bundle_file", ""): [
         lambda t: t.stranger(arm__urdf="<robot><mesh filename='run.sh'/></robot>", run__sh="true"),
-        lambda t: t.stranger(arm__urdf=XACRO),
-        lambda t: t.unpack(("arm.urdf", XACRO)),
+        lambda t: t.stranger(other__urdf=XACRO),
     ],
     ("bundle_text", ""): [lambda t: t.stranger(m__gltf=b"\xff\xfe"), lambda t: t.stranger(m__gltf="{"), lambda t: t.stranger(m__gltf="[]")],
     ("bundle_uri", ""): [
@@ -41,7 +40,7 @@ BUNDLES: Table = {
     ("bundle_zip", "bundle"): [
         lambda t: load_bundle(b"not a zip"),
         lambda t: t.unpack(("LICENSE", "all")),
-        lambda t: t.unpack(("arm.urdf.xacro", "<robot/>")),
+        lambda t: t.unpack(("arm_macro.xacro", "<robot/>")),
     ],
     ("bundle_choice", "bundle"): [lambda t: t.unpack(("a/scene.yaml", ""), ("b/scene.yaml", ""))],
     ("scene_package", ""): [lambda t: t.unpack(("arm.urdf", "<robot name='a'><mesh filename='package://no/m.obj'/></robot>"))],

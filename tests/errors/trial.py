@@ -112,7 +112,7 @@ class Trial:
         with zipfile.ZipFile(data, "w") as archive:
             for name, content in files:
                 archive.writestr(name, content)
-        return load_bundle(data.getvalue())
+        return load_bundle(data.getvalue()).scene
 
     def stranger(self, **files: str | bytes) -> Scene:
         """Loads a bundle of the workshop's scene, with these files beside it."""
@@ -123,7 +123,7 @@ class Trial:
             archive.writestr("bundle.json", json.dumps({"scene": path.name}))
             for file in self.directory.iterdir():
                 archive.writestr(file.name, file.read_bytes())
-        return load_bundle(data.getvalue())
+        return load_bundle(data.getvalue()).scene
 
     def ask(self, method: str, path: str, **options: Any) -> None:
         """Sends a request and raises the problem that it is answered with."""

@@ -1,6 +1,7 @@
 // What conditions of a scene allow, as translucent bodies: zones in which geometries stay, and cones in which directions of bodies stay.
 import * as three from "three";
 import type { Matrix } from "./kinematics";
+import { toMatrix4 } from "./matrix";
 import type { DrawnCone, DrawnZone, SceneModel } from "./schema";
 
 const Y = new three.Vector3(0, 1, 0);
@@ -51,7 +52,7 @@ export class Limits {
   }
 
   setPose(found: Map<string, Matrix>): void {
-    const X = (body: string): three.Matrix4 => new three.Matrix4().set(...(found.get(body)! as Parameters<three.Matrix4["set"]>));
+    const X = (body: string): three.Matrix4 => toMatrix4(found.get(body)!);
     for (const { body, at, drawn } of this.all) {
       drawn.matrix.copy(X(body)).setPosition(new three.Vector3().setFromMatrixPosition(X(at)));
       drawn.matrixWorldNeedsUpdate = true;

@@ -1,6 +1,7 @@
 // The robot in 3D as a component: what it holds is drawn by view.ts.
 import { useEffect, useRef, useState } from "preact/hooks";
-import type { SceneModel } from "./schema";
+import { get, said } from "./api";
+import type { SceneMeshes, SceneModel } from "./schema";
 import type { PlaneDrawn } from "./square";
 import { View } from "./view";
 
@@ -60,7 +61,7 @@ export function Robot({ model, q, label, touching = [], ghosts = NONE, plane = n
   );
 }
 
-/** What else the view can do: stand elsewhere, show frames, and leave bodies out. */
+/** What else the view can do: stand elsewhere, show frames and the models' own meshes, and leave bodies out. */
 function Tools({ model, view }: { model: SceneModel; view: { current: View | null } }) {
   const [frames, setFrames] = useState(false);
   const [hidden, setHidden] = useState<Set<string>>(new Set());
@@ -75,8 +76,43 @@ function Tools({ model, view }: { model: SceneModel; view: { current: View | nul
         <summary>bodies{hidden.size > 0 && `, ${hidden.size} hidden`}</summary>
         <Bodies bodies={roots(model)} model={model} hidden={hidden} onShow={show} onPoint={(body) => view.current?.point(body)} />
       </details>
+      {model.has_meshes && <Shown key={model.scene} model={model} view={view} />}
     </div>
   );
+}
+
+/** Switches the certified bodies, and the meshes that they stand for. The meshes are fetched when somebody wants them. */
+function Shown({ model, view }: { model: SceneModel; view: { current: View | null } }) {
+  const [certified, setCertified] = useState(true);
+  const [wanted, setWanted] = useState(false);
+  const [meshes, setMeshes] = useState<SceneMeshes | null>(null);
+  const [problem, setProblem] = useState<string | null>(null);
+  useEffect(() => {
+    if (!wanted || meshes) return;
+    setProblem(null);
+    get<SceneMeshes>(`/v1/scenes/${model.scene}/meshes`).then(setMeshes, (reason: unknown) => setProblem(said(reason)));
+  }, [wanted]);
+  useEffect(() => view.current?.setShown(certified, wanted ? meshes : null), [model, certified, wanted, meshes]);
+  return (
+    <>
+      <label><input type="checkbox" checked={certified} onChange={(event) => setCertified(event.currentTarget.checked)} /> certified bodies</label>
+      <label><input type="checkbox" checked={wanted} onChange={(event) => setWanted(event.currentTarget.checked)} /> meshes of the model</label>
+      {wanted && <p class="view-note" role="status">{problem ?? (meshes ? about(meshes) : "Loading the meshes …")}</p>}
+    </>
+  );
+}
+
+/** Says in words what the meshes are, and whether they are drawn as their files have them. */
+function about({ meshes, triangles, moved }: SceneMeshes): string {
+  if (meshes.length === 0) return `The meshes of the model have ${triangles.toLocaleString("en")} triangles, which are too many to draw.`;
+  const coarser = moved > 0 ? ` They are drawn coarser: points are up to ${rounded(1000 * moved)} mm from where they are in the files.` : "";
+  return `Grey: the model's collision meshes. Proofs are about the certified bodies, which contain them.${coarser}`;
+}
+
+/** Two digits, rounded up. */
+function rounded(value: number): string {
+  const unit = 10 ** (Math.floor(Math.log10(value)) - 1);
+  return String(Number((Math.ceil(value / unit) * unit).toPrecision(2)));
 }
 
 interface Listed {

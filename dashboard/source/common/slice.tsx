@@ -22,6 +22,8 @@ interface Props {
   cells?: Partition | null;
   /** A way through configuration space, drawn as a line. */
   way?: number[][];
+  /** Whether the scene has a map, whose cells are not drawn. */
+  mapped?: boolean;
 }
 
 type Axes = [number, number];
@@ -72,7 +74,7 @@ export function AxesChoice({ joints, axes, onChange }: { joints: string[]; axes:
 
 /** The slice along two joints, given by their places among those of the space. */
 export function SliceOf(props: Props & { axes: Axes }) {
-  const { scene, space, units, q, onPick, regions, strongest = null, cells = null, way, axes } = props;
+  const { scene, space, units, q, onPick, regions, strongest = null, cells = null, way, mapped = false, axes } = props;
   const [known, setKnown] = useState<{ asked: string; answer: SliceResponse } | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
   const [scheme, setScheme] = useState(0);
@@ -158,7 +160,7 @@ export function SliceOf(props: Props & { axes: Axes }) {
         <span class="key-map certified"><span class="proved">in a certified region</span></span> <span class="key-map free"><span class="computed">no collision at the sample</span></span> <span class="key-map taken"><span class="computed">in collision</span></span>
         {cells && <> <span class="key-map cells">cells</span></>}
         <br />
-        {problem ? <strong class="bad">{problem}</strong> : answer && current ? <span class="computed">{summary(answer)}</span> : "Computing …"}
+        {problem ? <strong class="bad">{problem}</strong> : answer && current ? <><span class="computed">{summary(answer)}</span>{mapped && " What the map proves is not drawn here."}</> : "Computing …"}
       </figcaption>
     </figure>
   );
@@ -183,7 +185,7 @@ function summary({ rows, regions }: SliceResponse): string {
   const signs = rows.join("");
   const percent = (sign: string): string => rounded((signs.split(sign).length - 1) / signs.length);
   const many = regions.length === 1 ? "1 region is" : `${regions.length} regions are`;
-  return `${percent("o")} of this slice is certified, ${percent("#")} in collision, by samples; ${many} in it.`;
+  return `${percent("o")} of this slice is in certified regions, ${percent("#")} in collision, by samples; ${many} in it.`;
 }
 
 interface DrawnLeaf {

@@ -2,6 +2,7 @@
 import * as three from "three";
 import { PROVED } from "./colours";
 import type { Matrix } from "./kinematics";
+import { toMatrix4 } from "./matrix";
 
 /** a'p + b = 0 for the points p of the plane, in the frame of a body, in metres. */
 export interface BodyPlane {
@@ -56,8 +57,7 @@ export class Square {
     if (!this.plane) return;
     const { frame, a, b } = this.plane;
     const normal = new three.Vector3(...(a as [number, number, number])), length = normal.length();
-    const X = new three.Matrix4().set(...(poses.get(frame)! as Parameters<three.Matrix4["set"]>));
-    const plane = new three.Plane(normal.divideScalar(length), b / length).applyMatrix4(X);
+    const plane = new three.Plane(normal.divideScalar(length), b / length).applyMatrix4(toMatrix4(poses.get(frame)!));
     const [first, second] = this.bodies.map(({ mesh, middle }) => middle.clone().applyMatrix4(mesh.matrix)) as [three.Vector3, three.Vector3];
     const [before, behind] = [plane.distanceToPoint(first), -plane.distanceToPoint(second)];
     this.mesh.position.copy(first).lerp(second, before / (before + behind));

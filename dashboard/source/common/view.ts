@@ -1,15 +1,19 @@
-// Draws a robot and its surroundings with three.js: the bodies that are certified, without the padding. It draws only when something has changed.
+// Draws a robot and its surroundings with three.js: the bodies that are certified, without the padding, and beside them the models' own
+// meshes. It draws only when something has changed.
 import * as three from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { ConvexGeometry } from "three/examples/jsm/geometries/ConvexGeometry.js";
 import { CONTACT, LINKS, onScheme, PROVED, token } from "./colours";
 import { movingBodies, ofCondition, poses, type Matrix } from "./kinematics";
+import { toMatrix4 } from "./matrix";
 import { Limits } from "./limits";
 import { pulled } from "./pull";
-import type { DrawnGeometry, SceneModel } from "./schema";
+import { Meshes } from "./meshes";
+import type { DrawnGeometry, SceneMeshes, SceneModel } from "./schema";
 import { Square, type PlaneDrawn } from "./square";
 
 const GHOST_OPACITY = 0.1;
+const AROUND_OPACITY = 0.3; // of certified bodies with meshes in them
 const MOST_GHOSTS = 300;
 const TURN = 0.12; // radians a key press
 const ZOOM = 1.15;
@@ -45,10 +49,6 @@ function shapeOf({ vertices: rows, triangles, radius }: DrawnGeometry): three.Bu
   return shape;
 }
 
-function toMatrix4(pose: Matrix): three.Matrix4 {
-  return new three.Matrix4().set(...(pose as Parameters<three.Matrix4["set"]>));
-}
-
 interface Drawn {
   geometry: DrawnGeometry;
   mesh: three.Mesh<three.BufferGeometry, three.MeshStandardMaterial>;
@@ -79,6 +79,8 @@ export class View {
   private axes: Map<string, three.AxesHelper> | null = null;
   private pair: number[] = [];
   private square: Square | null = null; // once a plane has been drawn
+  private meshes: Meshes | null = null; // while they are shown
+  private certified = true;
   private q: number[];
 
   /** Throws where the browser cannot draw with WebGL. */
@@ -91,7 +93,8 @@ export class View {
     this.drawn = model.geometries.map((geometry) => {
       const link = links.indexOf(geometry.body);
       const colour = link < 0 ? null : LINKS[link % LINKS.length]!;
-      const material = new three.MeshStandardMaterial({ roughness: 0.65, metalness: 0.05, flatShading: geometry.radius === 0, side: three.DoubleSide });
+      // A little farther away than they are: where a mesh has the same face, the mesh is seen.
+      const material = new three.MeshStandardMaterial({ roughness: 0.65, metalness: 0.05, flatShading: geometry.radius === 0, side: three.DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
       const mesh = new three.Mesh(shapeOf(geometry), material);
       mesh.matrixAutoUpdate = false;
       this.scene.add(mesh);
@@ -140,7 +143,7 @@ export class View {
   /** Looks at all bodies in view from a direction of the world, or from the present one, from as far as they need. */
   look(from: keyof typeof DIRECTIONS): void {
     const box = new three.Box3();
-    for (const { mesh } of this.drawn) if (mesh.visible) box.expandByObject(mesh);
+    for (const { geometry, mesh } of this.drawn) if (!this.hidden.has(geometry.body)) box.expandByObject(mesh);
     if (box.isEmpty()) return;
     const sphere = box.getBoundingSphere(new three.Sphere());
     const direction = DIRECTIONS[from] ? new three.Vector3(...DIRECTIONS[from]) : this.camera.position.clone().sub(this.controls.target);
@@ -157,8 +160,29 @@ export class View {
   /** Leaves the geometries of these bodies out. */
   setHidden(bodies: Set<string>): void {
     this.hidden = bodies;
-    for (const { geometry, mesh } of this.drawn) mesh.visible = !bodies.has(geometry.body);
     for (const ghost of this.ghosts) ghost.visible = !bodies.has(ghost.name);
+    this.show();
+  }
+
+  /** Draws the certified bodies or not, and the models' own meshes; null draws none. Bodies that have meshes in them can be seen through. */
+  setShown(certified: boolean, meshes: SceneMeshes | null): void {
+    this.certified = certified;
+    this.meshes?.dispose();
+    this.meshes = meshes && new Meshes(this.scene, meshes);
+    this.meshes?.colour(token("--quiet"));
+    for (const { mesh } of this.drawn) {
+      mesh.material.transparent = meshes !== null;
+      mesh.material.opacity = meshes ? AROUND_OPACITY : 1;
+      mesh.material.depthWrite = meshes === null;
+      mesh.material.needsUpdate = true;
+    }
+    this.show();
+    this.setPose(this.q);
+  }
+
+  private show(): void {
+    for (const { geometry, mesh } of this.drawn) mesh.visible = this.certified && !this.hidden.has(geometry.body);
+    this.meshes?.hide(this.hidden);
     this.draw();
   }
 
@@ -238,7 +262,7 @@ export class View {
       ray.setFromCamera(new three.Vector2((2 * (event.clientX - left)) / width - 1, 1 - (2 * (event.clientY - top)) / height), this.camera);
       return ray;
     };
-    const [hit] = aim(down).intersectObjects(this.drawn.map(({ mesh }) => mesh).filter(({ visible }) => visible));
+    const [hit] = aim(down).intersectObjects(this.drawn.filter(({ geometry }) => !this.hidden.has(geometry.body)).map(({ mesh }) => mesh));
     const link = this.drawn.find(({ mesh, colour }) => colour !== null && mesh === hit?.object);
     if (!hit || !link) return;
     down.stopImmediatePropagation();
@@ -266,6 +290,7 @@ export class View {
       axes.matrixWorldNeedsUpdate = true;
     }
     this.limits?.setPose(found);
+    this.meshes?.setPose(found);
     this.square?.setPose(found);
     this.draw();
   }
@@ -280,6 +305,7 @@ export class View {
       mesh.material.emissive.set(lit ?? "#000000");
       mesh.material.emissiveIntensity = lit ? 0.35 : 0;
     });
+    this.meshes?.colour(token("--quiet"));
     const names = touching.map((i) => this.model.geometries[i]!.name).filter(ofCondition);
     this.limits?.colour(new Set(names.map((name) => name.split("/")[1]!)), token("--good"), CONTACT);
     this.draw();
@@ -334,6 +360,7 @@ export class View {
     this.grid.dispose();
     this.limits?.dispose();
     this.square?.dispose();
+    this.meshes?.dispose();
     for (const { mesh } of this.drawn) {
       mesh.geometry.dispose();
       mesh.material.dispose();

@@ -45,7 +45,9 @@ function ofCsv(text: string): Path | string {
   const columns = names.length || rows[0]!.length;
   const time = names.indexOf("t");
   const others = names.filter((name) => name !== "t");
-  if (others.length > 0 && others.every((name) => name.startsWith("s"))) return `All columns have names that begin with s, so it holds s. ${Q_ONLY}`;
+  if (others.length > 0 && areNumbered("s", others)) return `Its columns are s. ${Q_ONLY}`;
+  if (others.length > 0 && !areNumbered("q", others))
+    return `Columns are in the scene's order of joints, and their names ${others.join(", ").slice(0, 200)} are not looked up. Name them q1, q2, ... in that order, and t; or leave the first row out.`;
   for (const [i, row] of rows.entries()) {
     const wrong = row.find((cell) => !isNumber(cell));
     if (wrong !== undefined) return `In waypoint ${i}, "${wrong}" is no number. Waypoints count from 0.`;
@@ -53,6 +55,11 @@ function ofCsv(text: string): Path | string {
   }
   const numbers = rows.map((row) => row.map(Number));
   return { q: numbers.map((row) => row.filter((_, i) => i !== time)), t: time < 0 ? null : numbers.map((row) => row[time]!) };
+}
+
+/** Whether columns are called q1, q2, ... or q0, q1, ..., where the letter is q. */
+function areNumbered(letter: string, names: string[]): boolean {
+  return [0, 1].some((first) => names.every((name, i) => name === `${letter}${first + i}`));
 }
 
 function isNumber(text: string): boolean {

@@ -4,7 +4,7 @@ import { duration } from "./outcomes";
 
 const WIDTH = 600,
   HEIGHT = 170;
-const LEFT = 52,
+const LEFT = 64,
   RIGHT = 14,
   TOP = 12,
   BOTTOM = 26;

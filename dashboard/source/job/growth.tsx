@@ -23,7 +23,7 @@ function Reached({ measure, points }: { measure: Measure; points: Known[] }) {
   const last = points.at(-1)!;
   return (
     <p class="small">
-      {percent(last.share)} {measure.reached} after {duration(last.seconds)}. Shares are estimated from samples; {measure.proved}.
+      <span class="computed">{percent(last.share)}</span> {measure.reached} after {duration(last.seconds)}. Shares are estimated from samples; {measure.proved}.
     </p>
   );
 }

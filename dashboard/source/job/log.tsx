@@ -88,6 +88,8 @@ export function Log({ store, subject }: { store: JobStore; subject: string }) {
   const [kind, setKind] = useState("");
   const known = store.events.filter((event) => !kind || event.kind === kind).reverse();
   const earlier = (store.events[0]?.seq ?? 1) > 1;
+  // A map has no regions, and a region no cover. Of events that are not here yet, nobody knows the kinds.
+  const there = Object.entries(KINDS).filter(([name]) => earlier || store.events.some((event) => event.kind === name));
   return (
     <section aria-labelledby="h-log">
       <h2 id="h-log">What happened</h2>
@@ -96,7 +98,7 @@ export function Log({ store, subject }: { store: JobStore; subject: string }) {
           Show{" "}
           <select aria-label="Show events" value={kind} onChange={(event) => setKind(event.currentTarget.value)}>
             <option value="">everything</option>
-            {Object.entries(KINDS).map(([name, words]) => (
+            {there.map(([name, words]) => (
               <option value={name} key={name}>
                 {words}
               </option>
@@ -104,7 +106,7 @@ export function Log({ store, subject }: { store: JobStore; subject: string }) {
           </select>
         </label>
       </div>
-      {known.length === 0 && <p class="empty">Nothing of this kind yet.</p>}
+      {known.length === 0 && <p class="empty">{kind ? "Nothing of this kind is among the events that are shown." : "Nothing has happened yet."}</p>}
       <ol class="scroll log" tabIndex={0} aria-label="Events, the newest first" reversed>
         {known.slice(0, 400).map((event) => (
           <li key={event.seq} data-kind={event.kind}>

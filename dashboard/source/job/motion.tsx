@@ -46,7 +46,7 @@ export function Motion({ job, scene }: { job: string; scene: string }) {
         <Robot model={model} q={q ?? motion.q[0]!} label={`The robot of ${model.name} on the motion`} />
         <Player motion={motion} names={positions(model)} units={model.units} onMove={setQ} />
       </div>
-      <p class="quiet small">{motion.charts ? "The motion is straight in s. Between waypoints, it takes a second for each unit of their distance in q" : "The motion is played at a speed of 1 in q"}, so it is not played as your robot moves.</p>
+      <p class="quiet small">{motion.charts ? "The motion is straight in s. Between waypoints, it takes a second for each radian or metre that all joints move together" : "The motion is played so that all joints together move by 1 radian or metre a second"}. Your robot may move otherwise.</p>
     </section>
   );
 }

@@ -14,7 +14,7 @@ export const OUTCOMES: Record<string, Outcome> = {
   r: { name: "refuted", glyph: "✗", words: "refuted" },
   e: { name: "error", glyph: "!", words: "error" },
   n: { name: "not_certifiable", glyph: "⊘", words: "not certifiable" },
-  t: { name: "too_close", glyph: "≈", words: "too close" },
+  t: { name: "too_close", glyph: "‖", words: "too close" },
   i: { name: "inconclusive", glyph: "?", words: "inconclusive" },
   w: { name: "running", glyph: "◌", words: "running" },
   o: { name: "open", glyph: "·", words: "open" },

@@ -17,8 +17,8 @@ import { Upload } from "./upload";
 
 const ASK_AGAIN_MS = 1500;
 
-/** `known`: how many regions the scene had when the page was made. */
-export function LibraryIsland({ scene, known }: { scene: string; known: number }) {
+/** `known` and `mapped`: how many regions the scene had when the page was made, and whether it had a map. */
+export function LibraryIsland({ scene, known, mapped }: { scene: string; known: number; mapped: boolean }) {
   const [model, setModel] = useState<SceneModel | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
   useEffect(() => {
@@ -26,10 +26,10 @@ export function LibraryIsland({ scene, known }: { scene: string; known: number }
   }, [scene]);
   if (problem) return <p class="notice bad">The scene cannot be drawn: {problem}</p>;
   if (!model) return <p class="empty">Loading the robot …</p>;
-  return <Library model={model} known={known} />;
+  return <Library model={model} known={known} mapped={mapped} />;
 }
 
-function Library({ model, known }: { model: SceneModel; known: number }) {
+function Library({ model, known, mapped }: { model: SceneModel; known: number; mapped: boolean }) {
   const names = useMemo(() => positions(model), [model]);
   const space: Space = useMemo(() => ({ joints: names, revolute: model.units.map((unit) => unit === "rad"), q_star: model.q_star, q_lower: model.q_lower, q_upper: model.q_upper }), [model]);
   const [q, setQ] = useState(model.q_star.map((value, i) => Math.min(Math.max(value, model.q_lower[i]!), model.q_upper[i]!)));
@@ -92,7 +92,7 @@ function Library({ model, known }: { model: SceneModel; known: number }) {
           <Sliders names={names} units={model.units} lower={model.q_lower} upper={model.q_upper} q={q} onChange={setQ} />
         </div>
         <div>
-          <Slice scene={model.scene} space={space} units={model.units} q={q} onPick={setQ} strongest={chosen} way={motion?.q} />
+          <Slice scene={model.scene} space={space} units={model.units} q={q} onPick={setQ} strongest={chosen} way={motion?.q} mapped={mapped} />
         <section aria-labelledby="h-graph">
           <h2 id="h-graph">Connected regions</h2>
           {graphProblem && <p class="notice bad">{graphProblem}</p>}
@@ -101,7 +101,7 @@ function Library({ model, known }: { model: SceneModel; known: number }) {
           ) : (
             <>
               <p class="counts">
-                <strong>{graph.nodes.length}</strong> {graph.nodes.length === 1 ? "region" : "regions"}, {graph.edges.length} {graph.edges.length === 1 ? "overlap" : "overlaps"}, <strong>{graph.components}</strong> {graph.components === 1 ? "component" : "components"}{!graph.complete && ", so far"}.{" "}
+                <strong>{graph.nodes.length}</strong> {graph.nodes.length === 1 ? "region" : "regions"}, {graph.edges.length} {graph.edges.length === 1 ? "overlap" : "overlaps"}, <strong>{graph.components}</strong> <abbr title="Regions are in one component where overlaps lead from each to every other one">{graph.components === 1 ? "component" : "components"}</abbr>{!graph.complete && ", so far"}.{" "}
                 {covered && <><span class="computed">They cover <strong>{(100 * covered.value).toFixed(0)} ± {Number((100 * covered.stderr).toPrecision(1))} %</strong> of the free configurations</span>, by a sample of {covered.free}.</>}
               </p>
               <Graph graph={graph} holding={holding} way={way} chosen={chosen} onChoose={choose} />
@@ -110,7 +110,7 @@ function Library({ model, known }: { model: SceneModel; known: number }) {
                 <summary>Overlaps as a table</summary>
                 <div class="scroll tall" tabIndex={0} role="region" aria-label="Overlaps">
                   <table>
-                    <thead><tr><th>Region</th><th>Region</th><th class="number">Depth in s</th></tr></thead>
+                    <thead><tr><th>Region</th><th>Region</th><th class="number">Depth in <InS /></th></tr></thead>
                     <tbody>
                       {graph.edges.map(({ a, b, depth, q: witness }) => (
                         <tr key={`${a} ${b}`}>
@@ -128,7 +128,7 @@ function Library({ model, known }: { model: SceneModel; known: number }) {
                   <summary>{graph.gaps.length} {graph.gaps.length === 1 ? "gap" : "gaps"} between components</summary>
                   <ul>
                     {graph.gaps.map((gap) => (
-                      <li key={`${gap.a} ${gap.b}`}>{gap.distance.toPrecision(3)} in s between {gap.a.slice(0, 8)} and {gap.b.slice(0, 8)}: {gap.map ? "the map proves the straight motion across it" : <Advice scene={model.scene} q={gap.q} onLook={setQ} />}</li>
+                      <li key={`${gap.a} ${gap.b}`}>{gap.distance.toPrecision(3)} in <InS /> between {gap.a.slice(0, 8)} and {gap.b.slice(0, 8)}: {gap.map ? "the map proves the straight motion across it" : <Advice scene={model.scene} q={gap.q} onLook={setQ} />}</li>
                     ))}
                   </ul>
                 </details>
@@ -148,6 +148,11 @@ function Library({ model, known }: { model: SceneModel; known: number }) {
       </div>
     </div>
   );
+}
+
+/** The coordinates of regions, which not everybody knows. */
+function InS() {
+  return <abbr title="s = tan((q − q*) / 2) for a joint that turns, and q − q* for one that slides">s</abbr>;
 }
 
 /** What people can do about a gap between two components. */

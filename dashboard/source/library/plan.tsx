@@ -121,6 +121,6 @@ function partOf({ begin, end, region, map, motion, guarantee }: Piece): Part {
 }
 
 function shownOf(plan: PlanResponse): Shown {
-  const claim = <><span class="proved">Proved:</span> on all of the planned motion, no collision of the covered pairs, by what its parts name; guarantee {plan.guarantee}.</>;
+  const claim = <><span class="proved">Proved:</span> on all of the planned motion, no collision of the scene's pairs. Below the robot stands what proves each part; guarantee {plan.guarantee}.</>;
   return { q: plan.q, t: plan.t, parts: plan.pieces.map(partOf), way: plan.pieces.map(({ region }) => region), claim, file: plan };
 }

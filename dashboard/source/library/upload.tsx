@@ -52,14 +52,14 @@ export function Upload({ model, onMove, onPair, onShow }: Props) {
         <input id="upload-path" type="file" accept=".json,.csv,application/json,text/csv" disabled={asking !== null} aria-describedby="upload-says" onChange={(event) => void ask(event.currentTarget.files?.[0])} />
       </p>
       <p class="quiet small" id="upload-says">
-        A JSON file with <code>q</code>, one row for each waypoint, and perhaps <code>t</code>; or a CSV file with such rows. Positions are in radians and metres. The path is straight in q between waypoints.
+        A JSON file with <code>q</code>, one row for each waypoint, and perhaps <code>t</code>; or a CSV file with such rows. Positions are in radians and metres. Between waypoints, each joint moves evenly.
       </p>
       <div role="status">
         {asking && <p class="notice">Certifying {asking} …</p>}
         {problem && <p class="notice bad">{problem}</p>}
         {answered && <Verdict verdict={answered.verdict} onPair={onPair} />}
       </div>
-      {answered && <p class="quiet small">{answered.path.t ? "The robot's view plays the times of the file as seconds, from 0 on." : "The file has no times. The robot's view plays the path at a speed of 1 in q, so not as your robot moves."}</p>}
+      {answered && <p class="quiet small">{answered.path.t ? "The robot's view plays the times of the file as seconds, from 0 on." : "The file has no times. The robot's view plays the path so that all joints together move by 1 radian or metre a second. Your robot may move otherwise."}</p>}
     </div>
   );
 }

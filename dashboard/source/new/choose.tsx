@@ -28,7 +28,7 @@ interface Several {
 }
 
 const GROUPS: [string, RegExp][] = [
-  ["Models of robots", /\.(urdf|sdf|mjcf)$/i],
+  ["Models of robots", /\.(urdf|sdf|mjcf|urdf\.xacro|sdf\.xacro)$/i],
   ["Scene files", /\.yaml$/i],
   ["Models of MuJoCo", /\.xml$/i],
 ];
@@ -102,7 +102,7 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
       <p>
         <span class="file">
           <label for="new-upload">or upload one</label>
-          <input id="new-upload" type="file" accept=".zip,.urdf,.sdf,.mjcf,application/zip" disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void take(chosenFiles(event.currentTarget.files))} />
+          <input id="new-upload" type="file" accept=".zip,.urdf,.sdf,.mjcf,.xacro,application/zip" disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void take(chosenFiles(event.currentTarget.files))} />
         </span>
         <span class="file">
           <label for="new-folder">or its folder</label>
@@ -110,7 +110,7 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
         </span>
       </p>
       <p class="quiet small" id="new-upload-says">
-        A folder, or a zip of it, with <code>scene.yaml</code> and every model and mesh that it refers to. Or a robot alone: its URDF, SDFormat or MJCF file, or a folder that has one and its meshes; the service then drafts the scene, as <code>ciris scene init</code> does. Or drop it anywhere on this page.
+        A folder, or a zip of it, with <code>scene.yaml</code> and every model and mesh that it refers to. Or a robot alone: its URDF, SDFormat, MJCF or xacro file, or a folder that has one and its meshes; the service then drafts the scene, as <code>ciris scene init</code> does. Or drop it anywhere on this page.
       </p>
       <div role="status">
         {sending && <p class="notice">Reading {sending} …</p>}

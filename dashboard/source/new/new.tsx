@@ -168,7 +168,7 @@ function Start({ given, model, parts, keyed, first }: Props & { given: string; m
         <div class="card">
           <Sliders names={names} units={model.units} lower={model.q_lower} upper={model.q_upper} q={q} onChange={setQ} />
           <p class="toolbar">
-            <button type="button" onClick={() => setQ(within(model, model.q_star))}>Centre q*</button>
+            <button type="button" title="The scene's own configuration q*, about which it is described" onClick={() => setQ(within(model, model.q_star))}>Centre q*</button>
             <button type="button" onClick={() => void search()}>Random free one</button>
             {moment.trouble.length > 0 && <button type="button" onClick={() => void moveNear()}>Free one near by</button>}
             {Object.keys(configurations).length > 0 && (

@@ -20,15 +20,15 @@ interface Props {
 const KINDS: Record<Kind, [string, string]> = {
   grow: ["Grow one region", "around this configuration of the robot, and certify it."],
   cover: ["Cover the scene", "with regions, one after another, until a share of it is covered or configurations are connected."],
-  map: ["Map the scene", "to prove as much as possible of the free configurations, cell by cell, without a seed."],
+  map: ["Map the scene", "to prove as much as possible of the free configurations, cell by cell. It needs no configuration to begin with."],
   "certify-path": ["Certify a motion", "from a file or through configurations, or find its first contact."],
-  certify: ["Certify a polytope", "from a file, as it is: one outcome for each pair."],
+  certify: ["Certify a polytope", "of joint positions (C s ≤ d) from a file, as it is: one outcome for each pair."],
   recertify: ["Certify a region again", "in this scene, after the scene has changed."],
 };
 const MARKS = {
   grow: ["The region must also contain", "such as where it shall meet another region"],
   coverage: ["Regions begin at", "before the service chooses where to begin"],
-  connect: ["Connect these configurations", "each gets a region; all of them shall end in one component"],
+  connect: ["Connect these configurations", "each gets a region; overlaps shall lead from each to all others"],
   map: ["Prove these configurations first", "before the samples decide where to work"],
   "certify-path": ["Waypoints", "where there is no file; the motion is straight in q between them"],
 } as const;

@@ -56,7 +56,7 @@ ${claim()}
 <p class="quiet">Saved ${new Date().toISOString().slice(0, 16).replace("T", " ")} UTC. This file shows the region ${region}, and is no proof. Check its proof file with <code>ciris verify ${region}.proof</code>.</p>
 <details><summary>Licences of the programs in this file</summary><pre>${escaped(licences)}</pre></details>
 </main>
-<script type="application/json" id="saved">${JSON.stringify(saved).replaceAll("<", "\\u003c")}</script>
+<script type="application/json" id="saved">${JSON.stringify({ ...saved, model: { ...saved.model, has_meshes: false } }).replaceAll("<", "\\u003c")}</script>
 <script type="module">${program.replaceAll("</script", "<\\/script")}</script>
 </body>
 </html>

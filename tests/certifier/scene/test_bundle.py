@@ -32,7 +32,7 @@ def test_a_bundle_is_the_same_scene():
     bundle = pack_bundle(path)
     assert names(bundle) == ["bundle.json", "dual_ur3e/pallet.sdf", "dual_ur3e/scene.yaml", "ur3e_bin/ur3e.urdf"]
     assert bundle == pack_bundle(path)
-    assert load_bundle(bundle).hash == parsed(path).hash
+    assert load_bundle(bundle).scene.hash == parsed(path).hash
 
 
 def test_a_zip_of_a_directory_is_a_scene_too():
@@ -40,7 +40,7 @@ def test_a_zip_of_a_directory_is_a_scene_too():
     path = EXAMPLES / "ur3e_bin" / "scene.yaml"
     files = {f"ur3e_bin/{file.name}": file.read_text() for file in path.parent.iterdir() if file.suffix in (".yaml", ".sdf", ".urdf")}
     litter = {"__MACOSX/ur3e_bin/._scene.yaml": "\0", "ur3e_bin/.DS_Store": "\0"}
-    assert load_bundle(zipped(files | litter)).hash == parsed(path).hash
+    assert load_bundle(zipped(files | litter)).scene.hash == parsed(path).hash
 
 
 def test_packages_and_meshes_travel_and_strangers_do_not(tmp_path):
@@ -66,7 +66,7 @@ def test_packages_and_meshes_travel_and_strangers_do_not(tmp_path):
         "scenes/room.sdf",
         "scenes/scene.yaml",
     ]
-    scene = load_bundle(bundle)
+    scene = load_bundle(bundle).scene
     assert len(scene.geometry("arm/hand/palm").vertices) == 4
     assert scene.hash == parsed(path).hash
 
@@ -85,7 +85,7 @@ def test_a_package_with_an_absolute_path_travels(tmp_path):
     assert {"a b/models/t.obj", "scenes/scene.yaml"} < {*names(bundle)}
     text = zipfile.ZipFile(io.BytesIO(bundle)).read("scenes/scene.yaml").decode()
     assert text == path.read_text().replace(str(models), '"../a b/models"')
-    assert load_bundle(bundle).hash == parsed(path).hash
+    assert load_bundle(bundle).scene.hash == parsed(path).hash
 
 
 @pytest.mark.parametrize(
@@ -203,7 +203,7 @@ def test_copies_for_packages_are_limited_as_the_zip_is():
     """The same file is taken from one package after the other, so it would be written as often."""
     arm = robot_with(*(f"package://p{i}/meshes/t.obj" for i in range(12)))
     limits = BundleLimits(unpacked_bytes=20000)
-    assert load_bundle(zipped({"arm.urdf": arm, "t.obj": TETRAHEDRON}), limits).geometries
+    assert load_bundle(zipped({"arm.urdf": arm, "t.obj": TETRAHEDRON}), limits).scene.geometries
     for files in ({"arm.urdf": arm, "t.obj": TETRAHEDRON + 2000 * "#"}, {"arm.urdf": arm, "t.obj": TETRAHEDRON, "a/b/c.txt": ""}):
         with pytest.raises(SceneError) as caught:
             load_bundle(zipped(files), limits if "a/b/c.txt" not in files else BundleLimits(files=6))
@@ -277,11 +277,11 @@ def test_what_included_mjcf_refers_to_starts_at_the_models_directory(tmp_path, f
     path = write(tmp_path, "directives: [{add_model: {name: arm, file: arm.xml}}]\n")
     bundle = pack_bundle(path)
     assert {*files, packed} <= {*names(bundle)}
-    assert load_bundle(bundle).hash == parsed(path).hash
+    assert load_bundle(bundle).scene.hash == parsed(path).hash
 
 
 def test_what_nobody_reads_does_not_keep_a_scene_from_travelling(tmp_path):
     more = "<gazebo><sensor filename='/x'><uri>http://example.org/x</uri></sensor></gazebo>"
     path = write(tmp_path, shape='<mesh filename="t.obj"/>', more=more)
     (tmp_path / "t.obj").write_bytes("# caf\u00e9\nmtllib \u00e9.mtl\n".encode("latin-1") + TETRAHEDRON.encode())
-    assert load_bundle(pack_bundle(path)).hash == parsed(path).hash
+    assert load_bundle(pack_bundle(path)).scene.hash == parsed(path).hash

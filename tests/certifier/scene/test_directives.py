@@ -87,7 +87,7 @@ def test_a_line_break_of_some_readers_only_is_refused(tmp_path, character, added
 def test_several_slashes_are_one_as_for_drake(tmp_path):
     scene = directive('add_model: {name: arm, file: "package://p//sub//../arm.urdf"}').replace("file: room.sdf", "file: .//room.sdf")
     path = write(tmp_path, scene)
-    assert parsed(path).hash == load_bundle(pack_bundle(path)).hash
+    assert parsed(path).hash == load_bundle(pack_bundle(path)).scene.hash
     with pytest.raises(SceneError, match=r"arm\.urdf:1: <orgin>"):
         parsed(write(tmp_path, scene, arm=BAD))
 

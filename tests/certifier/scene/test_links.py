@@ -66,7 +66,7 @@ def test_what_stands_beside_a_link_is_read(tmp_path, model, by_package):
     path = laid_out(tmp_path, model, by_package)
     scene = parsed(path)
     assert height(scene) == pytest.approx(HEIGHTS["installed"])
-    assert scene.hash == load_bundle(pack_bundle(path)).hash
+    assert scene.hash == load_bundle(pack_bundle(path)).scene.hash
     link = tmp_path / "installed" / model
     if model == "r.urdf":
         bounds = yourdfpy.URDF.load(str(link), load_meshes=False, load_collision_meshes=True, build_collision_scene_graph=True)
@@ -92,7 +92,7 @@ def test_a_scene_file_that_is_a_link_has_its_models_beside_it(tmp_path):
     path.symlink_to(tmp_path / "elsewhere" / "scene.yaml")
     scene = load_scene(path)
     assert height(scene) == pytest.approx(HEIGHTS["installed"])
-    assert scene.hash == load_bundle(pack_bundle(path)).hash
+    assert scene.hash == load_bundle(pack_bundle(path)).scene.hash
 
 
 @pytest.mark.parametrize("model", ["r.urdf", "r.sdf", "include.sdf", "r.xml", "include.xml"])

@@ -232,7 +232,7 @@ def test_a_position_outside_of_the_window_of_a_turn_is_refused(tmp_path: Path) -
 def test_the_file_travels_in_the_bundle(tmp_path: Path) -> None:
     inside = STATE.format(name="home", joints='<joint name="j1" value="0.5"/>') + '<disable_collisions link1="base" link2="l2"/>'
     here = scene(tmp_path, inside)
-    there = load_bundle(pack_bundle(tmp_path / "scene.yaml"))
+    there = load_bundle(pack_bundle(tmp_path / "scene.yaml")).scene
     assert there.hash == here.hash
     assert there.configurations == here.configurations
     (tmp_path / "arm.srdf").write_text('<!DOCTYPE robot [<!ENTITY a "a">]>' + robot(inside))

@@ -175,9 +175,9 @@ MORE = SDF.replace('name="room"', 'name="more"')
 def test_included_models_are_followed_through_the_killable_child(tmp_path):
     path = write(tmp_path, **sdf(more=INCLUDED.format(uri="more.sdf")))
     (tmp_path / "more.sdf").write_text(MORE.format(pose=POSE, shape=BOX, more=""))
-    assert load_scene(path).hash == load_bundle(pack_bundle(path)).hash
+    assert load_scene(path).hash == load_bundle(pack_bundle(path)).scene.hash
     (tmp_path / "more.sdf").write_text(MORE.format(pose=POSE, shape=BOX.replace("0.1", "0x1"), more=""))
-    for load in (load_scene, lambda path: load_bundle(pack_bundle(path))):
+    for load in (load_scene, lambda path: load_bundle(pack_bundle(path)).scene):
         with pytest.raises(SceneError, match=r"more\.sdf:4: <size>"):
             load(path)
 
@@ -347,7 +347,7 @@ def test_an_include_is_beside_the_model_and_not_beside_the_scene(tmp_path):
     path = laid_out(tmp_path, models__first=WITH_PART.format("first", "part.sdf", "p"), models__part=PART, cell__part="no model")
     scene = load_scene(path)
     assert "first::part/p" in scene.bodies
-    assert scene.hash == load_bundle(pack_bundle(path)).hash
+    assert scene.hash == load_bundle(pack_bundle(path)).scene.hash
 
 
 def test_models_of_one_directory_may_all_include(tmp_path):

@@ -1,12 +1,18 @@
 """Models in xacro are expanded in a child that reads nothing but the scene's files, and they travel expanded."""
 
+import os
+import socket
 import zipfile
 from io import BytesIO
 
 import pytest
 
 from certifier.errors import SceneError
+from certifier.isolation.confinement import Layers, probed
 from certifier.scene import load_bundle, load_scene, pack_bundle
+from certifier.scene.load import read_in_child
+from certifier.scene.macros import MEMORY_BYTES, TIMEOUT_S, Expander
+from certifier.scene.strange_xacro import MOST
 from tests.certifier.scene.workshop import ARM, BOX, LIMIT, write
 
 HEAD = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="arm">'
@@ -40,7 +46,7 @@ def test_the_service_loads_the_same_scene_without_xacro(tmp_path):
     extra = "packages: {parts: parts}\nxacro:\n  size: 0.3\n"
     path = scene(tmp_path, more=more, extra=extra, files={"parts/part.xacro": part})
     data = pack_bundle(path)
-    assert load_bundle(data).hash == load_scene(path).hash
+    assert load_bundle(data).scene.hash == load_scene(path).hash
     with zipfile.ZipFile(BytesIO(data)) as archive:
         texts = {name: archive.read(name).decode() for name in archive.namelist()}
     assert "xacro:include" not in texts["arm.urdf"]
@@ -90,15 +96,116 @@ def test_errors_of_the_expansion_say_so(tmp_path):
     assert error.message.startswith("arm.urdf (expanded):")
 
 
-def test_a_strangers_xacro_is_refused(tmp_path):
-    path = scene(tmp_path)
+def zipped(path, **more):
+    """A plain zip of the directory of a scene file, as a stranger sends it."""
     data = BytesIO()
     with zipfile.ZipFile(data, "w") as archive:
-        for file in path.parent.iterdir():
-            archive.write(file, file.name)
-    with pytest.raises(SceneError, match=r"written in xacro.*ciris scene add") as caught:
-        load_bundle(data.getvalue())
+        for file in sorted(path.parent.rglob("*")):
+            if file.is_file() and not file.is_symlink():
+                archive.write(file, file.relative_to(path.parent))
+        for name, text in more.items():
+            archive.writestr(name, text)
+    return data.getvalue()
+
+
+confined = pytest.mark.skipif(not (probed().landlock and probed().seccomp), reason="the kernel cannot confine who expands it")
+
+
+@confined
+def test_a_strangers_xacro_is_expanded_where_the_kernel_confines_who_does_it(tmp_path):
+    path = scene(tmp_path, extra="xacro: {size: 0.3}\n")
+    assert load_bundle(zipped(path)).scene.hash == load_scene(path).hash
+
+
+def test_elsewhere_a_strangers_xacro_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("certifier.scene.bundle.probed", lambda: Layers(namespaces=True, landlock=0, seccomp=True))
+    with pytest.raises(SceneError, match=r"arm\.urdf is written in xacro, and this machine cannot keep") as caught:
+        load_bundle(zipped(scene(tmp_path)))
     assert caught.value.code == "bundle_file"
+    assert "ciris scene add" in caught.value.hint
+
+
+@confined
+def test_a_robot_alone_in_xacro_is_drafted_with_the_packages_of_the_zip(tmp_path):
+    part = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="size" value="0.3"/></robot>'
+    more = '<xacro:include filename="$(find parts)/part.xacro"/>'
+    (tmp_path / "parts").mkdir()
+    path = scene(tmp_path, more=more, files={"parts/part.xacro": part})
+    (tmp_path / "arm.urdf").rename(tmp_path / "arm.urdf.xacro")
+    for file in (path, tmp_path / "room.sdf"):
+        file.unlink(missing_ok=True)
+    drafted = load_bundle(zipped(path)).scene
+    assert (drafted.name, drafted.n) == ("arm", 1)
+
+
+@confined
+@pytest.mark.parametrize(
+    "expression",
+    [
+        "xacro.load_yaml('/etc/passwd')",
+        "xacro.load_yaml('../bundle.zip')",
+        "python.open('/etc/passwd').read()",
+        "python.__import__('socket').socket().connect(('127.0.0.1', 80))",
+        "python.__import__('os').fork()",
+        "python.__import__('os').environ",
+    ],
+)
+def test_a_strangers_expression_reaches_no_file_and_no_network(tmp_path, expression):
+    path = scene(tmp_path, more=f'<xacro:property name="x" value="${{{expression}}}"/><link name="${{x}}"/>')
+    with pytest.raises(SceneError) as caught:
+        load_bundle(zipped(path))
+    assert caught.value.code == "scene_xacro"
+    assert "root:" not in caught.value.message
+
+
+@confined
+def test_an_expression_that_got_out_of_xacro_would_reach_nothing_either(tmp_path):
+    """What keeps it in is the kernel: this is called as the expansion is, without xacro and its hook around it."""
+    (tmp_path / "own").mkdir()
+    (tmp_path / "other").write_text("secret")
+    attack = {"other": str(tmp_path / "other")}
+    found = read_in_child(f"{__name__}:escaped", attack, "the attack", TIMEOUT_S, MEMORY_BYTES, str(tmp_path / "own"))
+    assert found == dict.fromkeys(("read", "written", "socket", "process"), False) | {"secrets": []}
+
+
+def escaped(payload):
+    """Tries what an expression should not, and returns what was possible."""
+
+    def works(attempt):
+        try:
+            attempt()
+        except OSError:
+            return False
+        return True
+
+    return {
+        "read": works(lambda: open(payload["other"]).close()),
+        "written": works(lambda: open("/tmp/escaped", "w").close()),
+        "socket": works(socket.socket),
+        "process": works(lambda: os.fork() or os._exit(0)),
+        "secrets": [name for name in os.environ if "CIRIS" in name or "KEY" in name or "DATABASE" in name],
+    }
+
+
+def test_nothing_is_expanded_in_the_process_that_reads_a_strangers_files(tmp_path, monkeypatch):
+    path = scene(tmp_path)
+    monkeypatch.setattr("certifier.scene.macros.alone", lambda: True)
+    with pytest.raises(SceneError, match=r"arm\.urdf is written in xacro, and only models") as caught:
+        Expander(tmp_path, {}, {}).expanded(path.parent / "arm.urdf", "arm.urdf")
+    assert caught.value.code == "bundle_file"
+
+
+@confined
+def test_an_argument_that_no_model_of_a_stranger_has_is_refused(tmp_path):
+    with pytest.raises(SceneError, match="no model has an argument 'sise'"):
+        load_bundle(zipped(scene(tmp_path, extra="xacro: {sise: 0.2}\n")))
+
+
+def test_a_stranger_may_have_a_few_models_in_xacro(tmp_path):
+    models = {f"m{k}.urdf": f'{HEAD}<xacro:property name="x" value="{k}"/></robot>' for k in range(MOST + 1)}
+    add = "".join(f"- add_model: {{name: m{k}, file: m{k}.urdf}}\n" for k in range(MOST + 1))
+    with pytest.raises(SceneError, match=f"{MOST + 1} models in xacro, and at most {MOST}"):
+        load_bundle(zipped(tmp_path / "scene.yaml", **models, **{"scene.yaml": f"directives:\n{add}"}))
 
 
 def test_a_file_that_only_declares_the_namespace_is_read_in_place(tmp_path):

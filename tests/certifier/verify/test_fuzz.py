@@ -222,7 +222,7 @@ def bundles(draw) -> bytes:
 def check_bundle(data: bytes) -> None:
     began = time.perf_counter()
     try:
-        scene = load_bundle(data)
+        scene = load_bundle(data).scene
     except SceneError as error:
         FIGURES.outcomes["bundle", error.code] += 1
     else:
