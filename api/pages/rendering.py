@@ -49,7 +49,7 @@ def kind_in_words(kind: str) -> str:
 _MEANINGS = {
     "certified": "The bodies are apart, and the verifier has accepted the proof.",
     "refuted": "Bodies touch, at a configuration that is shown.",
-    "not_certifiable": "It is proved that no certificate of this kind exists. The bodies may be apart all the same.",
+    "not_certifiable": "It is proved that no certificate of this kind exists. The bodies may still be apart.",
     "too_close": "The bodies are so close that no plane was found between them.",
     "inconclusive": "The search ended without an answer.",
     "error": "It could not be computed.",

@@ -1,6 +1,6 @@
 """The meshes of a scene's models are made ready here to be drawn beside the bodies that are certified. No proof depends on them.
 
-A browser draws only so many triangles. Where the models have more, points that are near each other become one of them.
+A browser draws a limited number of triangles. Where the models have more, points that are near each other become one of them.
 """
 
 from __future__ import annotations
