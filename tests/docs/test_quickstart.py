@@ -36,7 +36,7 @@ def service(environment: dict[str, str], directory: Path) -> Iterator[None]:
         stack.communicate(timeout=30)
 
 
-def test_every_command_of_the_quickstart_works_as_it_stands(tmp_path: Path) -> None:
+def test_every_command_of_the_quickstart_works(tmp_path: Path) -> None:
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     environment = surroundings(CIRIS_DATA_DIR=str(tmp_path / "data"), PATH=path)
 
