@@ -49,10 +49,10 @@ VERIFIED = 5 * SLICE
 HARD = 6 * SLICE
 """After this many cells of a pair, its open cells are cut off where the bodies are near, not only contacts. Where faces separate volumes
 that fewer joints move (certifier.partition.search), cells are cut off from the first round on."""
-LOSS, PATIENCE = 0.002, 108 * SLICE
+LOSS, PATIENCE, PARTED = 0.002, 108 * SLICE, 12 * SLICE
 """While open cells of a pair are cut off, its faces lose at most the share LOSS of the polytope in a round. The share doubles after every
-PATIENCE cells of a hard pair; where faces separate volumes that fewer joints move, after every PIECES slices, because more cells do not
-help where these volumes touch."""
+PATIENCE cells of a hard pair. Where faces separate volumes that fewer joints move, it doubles after every PARTED cells, because more cells
+do not help where these volumes touch."""
 FAST_LOSS = 0.05
 """They lose at most this share before that, and when the pair's effort is spent. From then on, the share doubles after every PIECES
 slices."""
@@ -242,8 +242,7 @@ def _most_loss(state: GrowthState, whole: Whole, pair: int, report: Outcomes) ->
         return _doubled(LATE_LOSS, (_gone(whole) - LATE) / LATER)
     effort, spent = _effort(state, whole, pair), whole.spent[pair]
     if hard < spent < effort:
-        patience = PATIENCE if hard else PIECES * SLICE
-        return _doubled(LOSS, max(spent - HARD, 0) // patience)
+        return _doubled(LOSS, max(spent - HARD, 0) // (PATIENCE if hard else PARTED))
     return _doubled(FAST_LOSS, max(spent - effort, 0) // (PIECES * SLICE))
 
 

@@ -21,7 +21,7 @@ from certifier.growth.actions import Certify, Finish, Outcomes, Propose
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import ENOUGH, GrowthOptions
 from certifier.growth.state import Best, GrowthState, Start, Whole
-from certifier.growth.whole import FAR, GAIN, HARD, LATE, LATEST, LEAST, LOSS, PARTS, PATIENCE, PIECES, SLICE, SMALLER, VERIFIED
+from certifier.growth.whole import FAR, GAIN, HARD, LATE, LATEST, LEAST, LOSS, PARTED, PARTS, PATIENCE, PIECES, SLICE, SMALLER, VERIFIED
 from certifier.jobs import local
 from certifier.jobs.local import grow
 from certifier.model import WORLD, Polytope
@@ -233,7 +233,7 @@ def test_contacts_are_costly_where_faces_lose_much_or_there_are_none(lost, cut, 
     assert whole._costly(state, report, [3], Cut(smaller, [Made(), Made(1, 0.1)], polytope)) == []
 
 
-@pytest.mark.parametrize(("joints", "begin", "cells"), [((), HARD, PATIENCE), ((0,), 0, PIECES * SLICE)])
+@pytest.mark.parametrize(("joints", "begin", "cells"), [((), HARD, PATIENCE), ((0,), 0, PARTED)])
 def test_faces_may_soon_lose_more_where_they_separate_volumes_that_fewer_joints_move(joints, begin, cells):
     report = SimpleNamespace(weaknesses={1: replace(weak(CORNER), joints=joints)})
     for spent, times in ((begin + 1, 0), (HARD + cells - 1, 0), (HARD + cells, 1), (HARD + 2 * cells, 2)):
