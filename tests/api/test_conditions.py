@@ -61,7 +61,7 @@ def test_a_model_has_the_zones_and_the_cones(client: TestClient, upright: Scene)
 
 def test_a_zone_with_nothing_in_it_is_drawn_as_nothing(upright: Scene) -> None:
     empty = Inside("nowhere", ("arm/link2/bar",), WORLD, ((0.0, 1.0, 0.0, -0.2), (0.0, -1.0, 0.0, 0.1)))
-    (zone,) = drawing.model("0", with_conditions(without_conditions(upright), [empty])).zones
+    (zone,) = drawing.model("0", with_conditions(without_conditions(upright), [empty]), False).zones
     assert (zone.vertices, zone.triangles) == ([], [])
 
 

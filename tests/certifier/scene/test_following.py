@@ -331,7 +331,7 @@ def test_drakes_methods_have_independent_joints_only(tmp_path):
 
 def test_what_draws_the_robot_is_told_which_joints_follow(tmp_path):
     _, scene = gripper(tmp_path, -0.09)
-    drawn = model("id", scene)
+    drawn = model("id", scene, False)
     assert [(joint.name, joint.index) for joint in drawn.joints if joint.follows] == [("arm/other", 1)]
     assert len(drawn.units) == scene.n == 2
 
