@@ -10,6 +10,7 @@ import io
 import json
 import os
 import tempfile
+import time
 import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -137,19 +138,24 @@ def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Bundled:
         root.mkdir()
         payload = {"archive": str(archive), "root": str(root), "limits": asdict(limits)}
         try:
-            seconds = limits.seconds(len(data))
-            found = read_in_child(_READER, payload, "the bundle", seconds, limits.memory_bytes, str(own))
+            until = time.monotonic() + limits.seconds(len(data))
+            found = read_in_child(_READER, payload, "the bundle", _left(until), limits.memory_bytes, str(own))
             if "expand" in found:
-                expanded = {one["path"]: _expanded(one, str(own)) for one in found["expand"]}
+                expanded = {one["path"]: _expanded(one, str(own), min(TIMEOUT_S, _left(until))) for one in found["expand"]}
                 again = {**payload, "scene": found["scene"], "expanded": expanded}
-                found = read_in_child(_READER, again, "the bundle", seconds, limits.memory_bytes, str(own))
+                found = read_in_child(_READER, again, "the bundle", _left(until), limits.memory_bytes, str(own))
             return Bundled(Scene.from_document(found["scene"]), found["meshes"])
         except CirisError as error:
             error.message = error.message.replace(f"{root}/", "")
             raise
 
 
-def _expanded(wanted: dict[str, Any], own: str) -> dict[str, Any]:
+def _left(until: float) -> float:
+    """Returns the seconds until then, a little where none are left. All children of one bundle share its time."""
+    return max(until - time.monotonic(), 0.1)
+
+
+def _expanded(wanted: dict[str, Any], own: str, seconds: float) -> dict[str, Any]:
     """Returns the expansion of a stranger's model in xacro, from a process that the kernel confines. What xacro evaluates is Python.
 
     Raises:
@@ -160,7 +166,7 @@ def _expanded(wanted: dict[str, Any], own: str) -> dict[str, Any]:
         message = f"{name} is written in xacro, and this machine cannot keep a stranger's xacro from its files and its network"
         hint = f"expand it, as `xacro {name} > robot.urdf` does, or use `ciris scene init` and `ciris scene add`, which expand it"
         raise SceneError("bundle_file", message, hint=hint)
-    return read_in_child(EXPAND, wanted, name, TIMEOUT_S, MEMORY_BYTES, own)
+    return read_in_child(EXPAND, wanted, name, seconds, MEMORY_BYTES, own)
 
 
 def _write(archive: zipfile.ZipFile, name: str, content: bytes) -> None:

@@ -4,12 +4,14 @@ import os
 import socket
 import zipfile
 from io import BytesIO
+from types import SimpleNamespace
 
 import pytest
 
 from certifier.errors import SceneError
 from certifier.isolation.confinement import Layers, probed
 from certifier.scene import load_bundle, load_scene, pack_bundle
+from certifier.scene.bundle import BundleLimits
 from certifier.scene.load import read_in_child
 from certifier.scene.macros import MEMORY_BYTES, TIMEOUT_S, Expander
 from certifier.scene.strange_xacro import MOST
@@ -206,6 +208,27 @@ def test_a_stranger_may_have_a_few_models_in_xacro(tmp_path):
     add = "".join(f"- add_model: {{name: m{k}, file: m{k}.urdf}}\n" for k in range(MOST + 1))
     with pytest.raises(SceneError, match=f"{MOST + 1} models in xacro, and at most {MOST}"):
         load_bundle(zipped(tmp_path / "scene.yaml", **models, **{"scene.yaml": f"directives:\n{add}"}))
+
+
+def test_all_children_of_a_strangers_zip_share_its_time(monkeypatch):
+    """Each child takes 15 s here, of 20 s that a small zip may take."""
+    answers = [{"scene": "scene.yaml", "expand": [{"path": f"m{k}.urdf"} for k in range(3)]}, *[{"text": "", "declared": []}] * 3, None]
+    clock, given = [0.0], []
+
+    def child(function, payload, name, seconds, *_):
+        given.append(seconds)
+        clock[0] += 15.0
+        answer = answers[len(given) - 1]
+        if answer is None:
+            raise SceneError("scene_model_crash", "no time is left")
+        return answer
+
+    monkeypatch.setattr("certifier.scene.bundle.read_in_child", child)
+    monkeypatch.setattr("certifier.scene.bundle.probed", lambda: Layers(namespaces=True, landlock=1, seccomp=True))
+    monkeypatch.setattr("certifier.scene.bundle.time", SimpleNamespace(monotonic=lambda: clock[0]))
+    with pytest.raises(SceneError, match="no time is left"):
+        load_bundle(b"a zip", BundleLimits(timeout_s=20.0))
+    assert given == pytest.approx([20.0, 5.0, 0.1, 0.1, 0.1], abs=1e-3)
 
 
 def test_a_file_that_only_declares_the_namespace_is_read_in_place(tmp_path):
