@@ -230,7 +230,7 @@ def test_a_pair_is_followed_through_the_iterations(browser: Any, url: str, datab
     assert strip.all_text_contents()[:4] == [
         "12 \N{MIDDLE DOT}iteration 12: open",
         "11 ?iteration 11: inconclusive",
-        "10 \N{ALMOST EQUAL TO}iteration 10: too close",
+        "10 \N{DOUBLE VERTICAL LINE}iteration 10: too close",
         "9 \N{CHECK MARK}iteration 9: certified",
     ]
     page.get_by_text("Certified in iteration 9; by sos; 0.1 s; at least 1 mm apart.").wait_for()
