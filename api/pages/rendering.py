@@ -67,14 +67,17 @@ def meaning(word: str) -> str:
 
 templates = Jinja2Templates(ROOT / "templates")
 templates.env.filters |= {
+    "at_least_degrees": at_least_degrees,
     "at_least_mm": at_least_mm,
     "at_most_mm": at_most_mm,
-    "powers": powers,
-    "stage": stage,
+    "degrees": math.degrees,
     "kind_in_words": kind_in_words,
+    "meaning": meaning,
+    "powers": powers,
+    "radians": math.radians,
+    "rounded_down": rounded_down,
+    "stage": stage,
 }
-templates.env.filters |= {"degrees": math.degrees, "radians": math.radians, "meaning": meaning}
-templates.env.filters |= {"at_least_degrees": at_least_degrees, "rounded_down": rounded_down}
 
 
 def page(request: Request, name: str, context: dict[str, Any], status: int = 200) -> Response:

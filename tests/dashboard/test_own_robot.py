@@ -9,12 +9,14 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from certifier.isolation.confinement import probed
 from certifier.model import Scene
 from db import events, jobs, pairs, steps
 from db.session import Database
 from db.states import IterationState
+from tests.certifier.scene.test_xacro import confining
 from tests.dashboard.job_scenes import SLIDE, add_iteration
+
+__all__ = ["confining"]
 
 LIMITS = "joint_limits:\n  shoulder: {max_velocity: !degrees 90}\n"
 TETRAHEDRON = "v 0 0 0\nv 0.05 0 0\nv 0 0.05 0\nv 0 0 0.05\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -102,7 +104,7 @@ def test_a_robot_without_its_meshes_says_which_file_is_missing(page: Any, url: s
     complaints.clear()
 
 
-@pytest.mark.skipif(not (probed().landlock and probed().seccomp), reason="the kernel cannot confine who expands it")
+@pytest.mark.usefixtures("confining")
 def test_a_robot_in_xacro_is_expanded(page: Any, url: str, tmp_path: Path) -> None:
     head = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="arm"><xacro:property name="size" value="0.1"/>'
     xacro = urdf("arm", "link.obj").replace('<robot name="arm">', head).replace('radius="0.1"', 'radius="${size}"')
