@@ -15,7 +15,7 @@ from numba import njit
 from certifier.collisions.seen import Seen
 from certifier.model import Array
 from certifier.motion.bodies import Bodies, place, place_links
-from certifier.motion.nearest import separation
+from certifier.motion.nearest import farther, separation
 from certifier.motion.views import acceleration, moved
 
 CLOSE = 1e-6
@@ -49,14 +49,46 @@ def _distance(bodies: Bodies, seen: Seen, pair: int, R: Array, p: Array) -> floa
 
 
 @njit(cache=True)
-def _touches(bodies: Bodies, seen: Seen, q: Array, R: Array, p: Array, order: np.ndarray) -> bool:
-    """Says whether a pair touches at q, whose links' poses are filled in. A pair that does comes first in ``order``."""
+def _touches(bodies: Bodies, seen: Seen, q: Array, R: Array, p: Array, order: np.ndarray, normals: Array) -> bool:
+    """Says whether a pair touches at q, whose links' poses are filled in. A pair that does comes first in ``order``.
+
+    Args:
+        normals: (P, 3) the directions along which each pair was apart the last time, or 0. They are tried first, and replaced.
+    """
     place_links(bodies, q, R, p)
     for k in range(len(order)):
-        if not _far(bodies, seen, order[k], R, p, 0.0) and _distance(bodies, seen, order[k], R, p) <= 0.0:
+        pair = order[k]
+        if _far(bodies, seen, pair, R, p, 0.0) or _apart_along(bodies, seen, pair, R, p, normals[pair]):
+            continue
+        a, b = seen.pairs[pair, 0], seen.pairs[pair, 1]
+        points = np.empty((bodies.first[b + 1] - bodies.first[b], 3))
+        place(bodies, b, bodies.links[a], R, p, points)
+        if not farther(bodies.vertices[bodies.first[a] : bodies.first[a + 1]], points, seen.reaches[pair], normals[pair]):
             _to_front(order, k)
             return True
     return False
+
+
+@njit(cache=True)
+def _apart_along(bodies: Bodies, seen: Seen, pair: int, R: Array, p: Array, normal: Array) -> bool:
+    """Says whether a pair's padded bodies are apart along a direction in the frame of the first one's link, (3,), of length 1 or 0."""
+    a, b = seen.pairs[pair, 0], seen.pairs[pair, 1]
+    here, there = bodies.links[a], bodies.links[b]
+    gap = np.inf
+    for v in range(bodies.first[a], bodies.first[a + 1]):
+        along = normal[0] * bodies.vertices[v, 0] + normal[1] * bodies.vertices[v, 1] + normal[2] * bodies.vertices[v, 2]
+        gap = min(gap, along)
+    way, turned = normal, np.zeros(3)  # in the world, then in the frame of the second one's link
+    offset = 0.0
+    for i in range(3):
+        world = R[here, i, 0] * way[0] + R[here, i, 1] * way[1] + R[here, i, 2] * way[2]
+        offset += world * (p[there, i] - p[here, i])
+        for j in range(3):
+            turned[j] += world * R[there, i, j]
+    most = -np.inf
+    for v in range(bodies.first[b], bodies.first[b + 1]):
+        most = max(most, turned[0] * bodies.vertices[v, 0] + turned[1] * bodies.vertices[v, 1] + turned[2] * bodies.vertices[v, 2])
+    return gap - most - offset > seen.reaches[pair]
 
 
 @njit(cache=True)
@@ -81,8 +113,7 @@ def distance_at(bodies: Bodies, seen: Seen, pair: int, q: Array, R: Array, p: Ar
 @njit(cache=True)
 def touching_at(bodies: Bodies, seen: Seen, q: Array, order: np.ndarray) -> int:
     """Returns the first pair that is found to touch at joint positions q, (n,), or -1. For ``order`` see :func:`free_at`."""
-    links = len(bodies.parents)
-    return order[0] if _touches(bodies, seen, q, np.empty((links, 3, 3)), np.empty((links, 3)), order) else -1
+    return order[0] if not free_at(bodies, seen, q, order) else -1
 
 
 @njit(cache=True)
@@ -93,7 +124,7 @@ def free_at(bodies: Bodies, seen: Seen, q: Array, order: np.ndarray) -> bool:
         order: (P,) the pairs in the order in which they are looked at. One that touches is moved to the front.
     """
     links = len(bodies.parents)
-    return not _touches(bodies, seen, q, np.empty((links, 3, 3)), np.empty((links, 3)), order)
+    return not _touches(bodies, seen, q, np.empty((links, 3, 3)), np.empty((links, 3)), order, np.zeros((len(order), 3)))
 
 
 @njit(cache=True)
@@ -101,8 +132,9 @@ def free_at_all(bodies: Bodies, seen: Seen, q: Array, order: np.ndarray) -> np.n
     """Says at which of the joint positions q, (N, n), no pair touches; (N,). For ``order`` see :func:`free_at`."""
     links = len(bodies.parents)
     R, p, found = np.empty((links, 3, 3)), np.empty((links, 3)), np.empty(len(q), dtype=np.bool_)
+    normals = np.zeros((len(seen.pairs), 3))
     for i in range(len(q)):
-        found[i] = not _touches(bodies, seen, q[i], R, p, order)
+        found[i] = not _touches(bodies, seen, q[i], R, p, order, normals)
     return found
 
 
@@ -120,7 +152,7 @@ def free_along(bodies: Bodies, seen: Seen, q0: Array, q1: Array, order: np.ndarr
     R, p, known = np.empty((STEPS + 2, links, 3, 3)), np.empty((STEPS + 2, links, 3)), np.zeros(STEPS + 2, dtype=np.bool_)
     middle = STEPS // 2  # most lines that touch something do so there as well
     known[middle] = True
-    if _touches(bodies, seen, q0 + 0.5 * way, R[middle], p[middle], order):
+    if _touches(bodies, seen, q0 + 0.5 * way, R[middle], p[middle], order, np.zeros((len(order), 3))):
         return False
     place_links(bodies, q0, R[0], p[0])
     normal, other, stack, moving = np.empty(3), np.empty(3), np.empty(64), np.empty((2 * len(bodies.vertices), 3))
@@ -134,6 +166,7 @@ def free_along(bodies: Bodies, seen: Seen, q0: Array, q1: Array, order: np.ndarr
         A, W, frame = bodies.vertices[bodies.first[a] : bodies.first[a + 1]], bodies.first[b + 1] - bodies.first[b], bodies.links[a]
         B = moving[: 2 * W]  # first where b is at the beginning of an interval, then where it is at the end
         place(bodies, b, frame, R[0], p[0], B[:W])
+        normal[:], other[:] = 0.0, 0.0
         t0, top = 0.0, 1
         stack[0] = 1.0
         while top:
@@ -144,11 +177,11 @@ def free_along(bodies: Bodies, seen: Seen, q0: Array, q1: Array, order: np.ndarr
                 place_links(bodies, q0 + t1 * way, R[slot], p[slot])
                 known[slot] = kept
             place(bodies, b, frame, R[slot], p[slot], B[W:])
-            if separation(A, B, normal) > reach + (t1 - t0) ** 2 / 8.0 * bent:
+            if farther(A, B, reach + (t1 - t0) ** 2 / 8.0 * bent, normal):
                 B[:W] = B[W:]
                 t0, top = t1, top - 1
                 continue
-            if separation(A, B[W:], other) <= reach or (t1 - t0) * distance <= close:
+            if not farther(A, B[W:], reach, other) or (t1 - t0) * distance <= close:
                 _to_front(order, k)
                 return False
             stack[top] = (t0 + t1) / 2.0

@@ -108,9 +108,35 @@ def separation(A: Array, B: Array, normal: Array) -> float:
         normal: (3,) gets a unit vector n from B to A; what is returned is min over A of n'v - max over B of n'w. It is 0 or negative, and
             the vector is of no use, where the hulls meet.
     """
+    for i in range(3):
+        normal[i] = A[0, i] - B[0, i]
+    return _separation(A, B, normal, -1.0, np.inf)
+
+
+@njit(cache=True)
+def farther(A: Array, B: Array, reach: float, normal: Array) -> bool:
+    """Says whether the hulls of A (V, 3) and B (W, 3) are more than ``reach`` metres apart.
+
+    Args:
+        normal: (3,) the direction to try first, from B to A, or 0; it gets the best one found. One that was enough when the hulls were
+            elsewhere often is again.
+    """
+    if normal[0] == 0.0 and normal[1] == 0.0 and normal[2] == 0.0:
+        for i in range(3):
+            normal[i] = A[0, i] - B[0, i]
+    return _separation(A, B, normal, reach, reach) > reach
+
+
+@njit(cache=True)
+def _separation(A: Array, B: Array, normal: Array, least: float, most: float) -> float:
+    """Does what :func:`separation` does, until it knows that the hulls are at most ``least`` or more than ``most`` apart.
+
+    Args:
+        normal: (3,) the first direction, not 0, of any length; it gets the best one.
+    """
     room = np.empty((7, 3))
     P, z, work = room[:4], room[4], room[5:]
-    z[0], z[1], z[2] = A[0, 0] - B[0, 0], A[0, 1] - B[0, 1], A[0, 2] - B[0, 2]
+    z[0], z[1], z[2] = normal[0], normal[1], normal[2]
     m, best = 0, -np.inf
     for _ in range(STEPS):
         length = np.sqrt(_dot(z, z))
@@ -128,7 +154,8 @@ def separation(A: Array, B: Array, normal: Array) -> float:
         if (low - high) / length > best:
             best = (low - high) / length
             normal[0], normal[1], normal[2] = z[0] / length, z[1] / length, z[2] / length
-        if best >= length * (1.0 - CONVERGED):
+        # The first direction may be no difference of two points, so its length says nothing.
+        if best > most or (m > 0 and (best >= length * (1.0 - CONVERGED) or length <= least)):
             return best
         x, y, w = A[a, 0] - B[b, 0], A[a, 1] - B[b, 1], A[a, 2] - B[b, 2]
         for i in range(m):

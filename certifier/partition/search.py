@@ -21,6 +21,7 @@ import heapq
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,7 +34,7 @@ from certifier.partition.hulls import gaps
 from certifier.partition.levels import MANY_JOINTS, Level, levels_of
 from certifier.partition.shared import Shared
 from certifier.partition.tree import Node, OpenCell, Streams
-from certifier.polytopes.simplex import deepest
+from certifier.polytopes.simplex import deepest, maximise
 from certifier.proof.partition import EMPTY, OPEN, PLANE, choices_of
 
 NARROW = np.radians(3.0)
@@ -54,7 +55,8 @@ that are looked at, of bodies that MANY_JOINTS or more move."""
 SAVED, MOST_PARTED = 2, 6
 """Where faces are added, and MANY_JOINTS or more move one body against the other, they separate the slimmest level that at most MOST_PARTED
 joints move. Of bodies that are no two chains, it has to save SAVED joints, and to have a coarse volume in the place of one of them only.
-Narrow cells of it stay open: once the faces separate the volumes, the bodies need no cells."""
+Narrow cells of it stay open where slimmer volumes have no plane either, and are not cut for these: once the faces separate the volumes, the
+bodies need no cells."""
 ROOM = 0.25
 """At every point that stays inside, the volumes that faces separate are farther apart than this part of the larger radius. Faces between
 nearer ones would have to pass close by the point, and cost most of the polytope."""
@@ -64,8 +66,25 @@ in a small corner only. Of two chains, a cell in which the volumes of a level to
 that faces separate. Cuts for them would only multiply the cells of the next level, which has to be cut in other joints."""
 BEYOND = 1e-9
 """A point may lie beyond a face by this."""
+SPARE, BESIDE = 0.4, 0.02
+"""Where a plane takes too many pieces to prove, a side of the cell that the polytope leaves free is cut off, if it is the share SPARE
+of the cell's width in a joint or more. Between the cut and the polytope lies BESIDE of the polytope's width."""
 FEW = 16
 """At most this many points of a narrow cell are reported."""
+
+
+class _Cut(NamedTuple):
+    """Says how to cut a cell.
+
+    Attributes:
+        joint: the joint to cut it in.
+        points: (p, n) points of the polytope in the cell.
+        value: where, in s; None for the middle of its range of q.
+    """
+
+    joint: int
+    points: Array
+    value: float | None = None
 
 
 @dataclass
@@ -133,9 +152,10 @@ class Search:
             if cut is None:
                 report.left += len(cell.samples) if cell.node.kind == OPEN else 0
                 continue
-            joint, points = cut
+            joint, points, value = cut
             narrow = self._turn(cell, self.bodies)[self.joints].max() * area.finer < NARROW
-            value = None if narrow else self._middle_of(cell, joint)
+            if value is None and not narrow:
+                value = self._middle_of(cell, joint)
             if value is None:
                 report.left += len(cell.samples)
                 report.narrow.append(points[:FEW])
@@ -192,8 +212,8 @@ class Search:
         """Returns how far every joint turns in the cell, (n,); a slide counts relative to the bodies' extent."""
         return 1 / self._area.scene.scale(bodies.extent) * cell.turn()
 
-    def _settle(self, cell: Cell, report: Report) -> tuple[int, Array] | None:
-        """Settles a cell, or returns the joint to cut it in and its points."""
+    def _settle(self, cell: Cell, report: Report) -> _Cut | None:
+        """Settles a cell, or returns how to cut it."""
         start = self._start(cell)
         if start is None:
             return None
@@ -203,10 +223,14 @@ class Search:
             if isinstance(found, Separated):
                 self._separated(cell, level, found)
                 return None
+            spare = self._spare(cell, bodies, start, found)
+            if spare is not None:
+                return spare
             joint = self._cut_for(cell, bodies, found)
             if joint is not None:
-                return joint, found.points
+                return _Cut(joint, found.points)
             if bodies is self.parted:
+                self._try_slimmer(cell, start, level)
                 return None
             cell.node.level = level
         found = self.bodies.separate(cell, start)
@@ -221,7 +245,33 @@ class Search:
             if nearest is not None and nearest[1] * self._area.finer < TOUCH * self.bodies.extent:
                 report.narrow.append(nearest[0][None])
                 return None
-        return self._cut(cell, self.bodies, found), found.points
+        return self._spare(cell, self.bodies, start, found) or _Cut(self._cut(cell, self.bodies, found), found.points)
+
+    def _try_slimmer(self, cell: Cell, start: Array, level: int) -> None:
+        """Settles a cell, if it can be, with slimmer volumes than those of this level."""
+        for slimmer in range(level - 1, -1, -1):
+            found = self._levels[slimmer].separate(cell, start)
+            if isinstance(found, Separated):
+                self._separated(cell, slimmer, found)
+                return
+
+    def _spare(self, cell: Cell, bodies: Bodies, start: Array, found: Undecided) -> _Cut | None:
+        """Returns how to cut off a side of a cell that the polytope leaves free; None where there was no plane to prove, or hardly a side.
+
+        A proof is about all of the cell's box, and takes pieces for what lies beside the polytope as well.
+        """
+        if found.support is not None:
+            return None
+        joints = np.array(bodies.joints)
+        axes = np.eye(len(start))[joints]
+        ends = maximise(cell.inside.C, cell.inside.d, np.concatenate([axes, -axes]), start)[0]
+        lower, upper = cell.lower[joints], cell.upper[joints]
+        most, least = (part[np.arange(len(joints)), joints] for part in np.split(ends, 2))
+        margin = BESIDE * (most - least) + BEYOND * (upper - lower)
+        values = np.concatenate([least - margin, most + margin])
+        free = np.concatenate([values[: len(joints)] - lower, upper - values[len(joints) :]]) / np.tile(upper - lower, 2)
+        best = int(free.argmax())
+        return _Cut(int(joints[best % len(joints)]), found.points, float(values[best])) if free[best] > SPARE else None
 
     def at_hand(self, node: Node) -> Bodies:
         """Returns the fat balls that an open cell is tried with next; the volumes themselves where it is tried with slimmer ones."""

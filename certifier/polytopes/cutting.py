@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from cachetools import LRUCache, cached
-from scipy.optimize import linprog
 
 from certifier.model import Array, Polytope, Scene
 from certifier.polytopes.gibbs import uniform_in_q
+from certifier.polytopes.hinge import hinge_face
 from certifier.polytopes.proved import cleaned
 
 CHAINS, EACH = 1000, 16
@@ -217,13 +217,13 @@ def _face(beyond: Array, keep: Array, samples: Array, scale: Array) -> tuple[Arr
     mean = rest.mean(axis=0)
     way = np.linalg.solve(np.cov(rest.T).reshape(len(scale), -1) + 1e-9 * np.eye(len(scale)), far.mean(axis=0) - mean)
     chosen = np.argsort(-(rest @ way), kind="stable")[:TAIL]
-    found = _hinge(far, near, rest[chosen])
+    found = hinge_face(far, near, rest[chosen], MARGIN)
     for _ in range(AGAIN):
         more = np.empty(0) if found is None else np.setdiff1d(np.flatnonzero(rest @ found[0] > found[1]), chosen)[:TAIL]
         if not len(more):
             break
         chosen = np.concatenate([chosen, more])
-        found = _hinge(far, near, rest[chosen])
+        found = hinge_face(far, near, rest[chosen], MARGIN)
     if found is None:
         return None
     x, offset = found
@@ -234,17 +234,3 @@ def _face(beyond: Array, keep: Array, samples: Array, scale: Array) -> tuple[Arr
     normal = x / scale
     length = float(np.linalg.norm(normal))
     return normal / length, float((offset + normal @ middle) / length)
-
-
-def _hinge(far: Array, near: Array, rest: Array) -> tuple[Array, float] | None:
-    """Returns a face (k,), offset with ``far`` beyond it, ``near`` before it, and few of ``rest`` (h, k) beyond it; None without one.
-
-    It is the multiplier of the dual program's 1 + k rows. The primal has a row for every point, and takes three times as long.
-    """
-    points = np.concatenate([-far, near, rest])
-    signs = np.concatenate([np.ones(len(far)), -np.ones(len(near) + len(rest))])
-    margins = np.concatenate([np.zeros(len(far)), -np.ones(len(near)), np.full(len(rest), -MARGIN)])
-    bounds = [(0, None)] * (len(far) + len(near)) + [(0, 1)] * len(rest)
-    rows = np.vstack([points.T, signs])
-    found = linprog(margins, A_eq=rows, b_eq=np.zeros(len(rows)), bounds=bounds, method="highs")
-    return (found.eqlin.marginals[:-1], float(found.eqlin.marginals[-1])) if found.status == 0 else None

@@ -21,6 +21,8 @@ _FORGET = 40
 """The chains start from points that are uniform in s, and walk on for this many rounds over all axes first."""
 _THIN = 8
 """Between two samples of a chain lie this many rounds over all axes."""
+AFRESH = 8
+"""The slack of the faces is computed anew after this many rounds, so that rounding does not add up."""
 LANES = 32
 """This many chains walk side by side."""
 
@@ -73,14 +75,14 @@ def _rounds(begins: np.ndarray, faces: np.ndarray, entries: Array, d: Array, rev
     n, k = s.shape
     slack, least, most, moved = np.empty((len(d), k)), np.empty(k), np.empty(k), np.empty(k)
     for turn in range(len(places)):
-        # The slack is computed anew in every round, so that rounding does not add up.
-        for j in range(len(d)):
-            slack[j] = d[j]
-        for i in range(n):
-            for e in range(begins[i], begins[i + 1]):
-                j, entry = faces[e], entries[e]
-                for c in range(k):
-                    slack[j, c] -= s[i, c] * entry
+        if turn % AFRESH == 0:
+            for j in range(len(d)):
+                slack[j] = d[j]
+            for i in range(n):
+                for e in range(begins[i], begins[i + 1]):
+                    j, entry = faces[e], entries[e]
+                    for c in range(k):
+                        slack[j, c] -= s[i, c] * entry
         for i in range(n):
             least[:], most[:] = -np.inf, np.inf
             for e in range(begins[i], begins[i + 1]):

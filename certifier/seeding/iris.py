@@ -69,10 +69,8 @@ def iris(scene: Scene, points: Array, options: SeedOptions) -> tuple[Array, Arra
     rng = np.random.default_rng(options.random_seed or 0)
     best: _Found | None = None
     for _ in range(AGAIN):
-        found = _found(scene, points, options, rng)
-        if best is None or found.ellipsoid.volume > best.ellipsoid.volume:
-            best = found
-        if best.kept >= LEAST_KEPT:
+        best = _found(scene, points, options, rng, best.volume if best else 0.0) or best
+        if best is None or best.kept >= LEAST_KEPT:
             break
     assert best is not None, "there is a first time"
     turn, trim = best.turn, best.trim
@@ -92,18 +90,21 @@ class _Found:
     Attributes:
         turn: the last of the alternations.
         trim: what samples show to collide is cut off its polytope.
-        ellipsoid: the largest one in the polytope of ``trim``.
+        volume: of the largest ellipsoid in the polytope of ``trim``.
         kept: how wide this ellipsoid is, as a part of the widest one of the alternations, in the mean over all directions.
     """
 
     turn: _Turn
     trim: Trim
-    ellipsoid: Ellipsoid
+    volume: float
     kept: float
 
 
-def _found(scene: Scene, points: Array, options: SeedOptions, rng: np.random.Generator) -> _Found:
-    """Alternates between faces and ellipsoid, and cuts off the corners that samples show to collide."""
+def _found(scene: Scene, points: Array, options: SeedOptions, rng: np.random.Generator, least: float) -> _Found | None:
+    """Alternates between faces and ellipsoid, and cuts off the corners that samples show to collide.
+
+    Returns None as soon as the largest ellipsoid in the polytope is seen to be no larger than ``least``.
+    """
     contacts, limits = Contacts(scene), scene.polytope([], [])
     samples = hit_and_run(limits, points[0], SAMPLES, int(rng.integers(2**31)))
     few = min(MOST, FEW * float((~contacts.free(samples)).mean()))
@@ -119,9 +120,10 @@ def _found(scene: Scene, points: Array, options: SeedOptions, rng: np.random.Gen
         turn = _alternated(contacts, points, begin, few, BESIDE_ITERATIONS, options, rng)
         widest = max(widest, turn.ellipsoid.volume)
     trim = Trim(scene, turn.polytope, points, options, rng)
-    trim.by_samples()
-    ellipsoid = inscribed_ellipsoid(trim.polytope)
-    return _Found(turn, trim, ellipsoid, float((ellipsoid.volume / widest) ** (1 / scene.n)))
+    ellipsoid = trim.by_samples(least)
+    if ellipsoid is None:
+        return None
+    return _Found(turn, trim, ellipsoid.volume, float((ellipsoid.volume / widest) ** (1 / scene.n)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,9 @@ from certifier.isolation.telling import tell
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Pair, Polytope, Scene
 from certifier.polytopes.cutting import cut
+from certifier.polytopes.ellipsoid import Ellipsoid, inscribed_ellipsoid
 from certifier.polytopes.gibbs import uniform_in_q
+from certifier.polytopes.polytope import drop_redundant
 from certifier.polytopes.sampling import hit_and_run
 from certifier.seeding.coarse_pairs import coarse_pairs_of, with_coarse_pairs
 from certifier.seeding.contacts import Contacts
@@ -63,11 +65,19 @@ class Trim:
         self._count = math.ceil(2 * math.log(1 / options.delta) / (options.epsilon * PASSES**2) / EACH)
         self._few = PASSES * options.epsilon * self._count * EACH
 
-    def by_samples(self) -> None:
-        """Cuts off what samples show: first of small copies about the seed, then of all of the polytope."""
+    def by_samples(self, least: float) -> Ellipsoid | None:
+        """Cuts off what samples show: first of small copies about the seed, then of all of the polytope.
+
+        Returns:
+            the largest ellipsoid in the polytope then; None, at once, where its volume is ``least`` or smaller.
+        """
         for size in SIZES:
             self._until_few(self._scene, partial(self._of_copy, size), FEW)
+            if least and inscribed_ellipsoid(self.polytope).volume <= least:
+                return None
         self.passed = self._until_few(self._wider, self._of_all, self._few)
+        ellipsoid = inscribed_ellipsoid(self.polytope)
+        return ellipsoid if ellipsoid.volume > least else None
 
     def by_descents(self) -> None:
         """Cuts off the contacts that descents find, and what samples show then."""
@@ -99,7 +109,8 @@ class Trim:
             made = cut(self._scene, self.polytope, self._points, corners, self._around)
             if made.polytope is None or made.polytope is self.polytope:
                 break
-            self.polytope, self._around = made.polytope, made.around
+            kept = drop_redundant(made.polytope, fixed=2 * self._scene.n)
+            self.polytope, self._around = Polytope(made.polytope.C[kept], made.polytope.d[kept]), made.around
         return False
 
 

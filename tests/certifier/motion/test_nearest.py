@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from certifier.motion.nearest import separation
+from certifier.motion.nearest import farther, separation
 
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / 2.0
 
@@ -140,3 +140,21 @@ def test_hulls_that_meet_are_not_apart():
     for _ in range(5_000):
         A, B = plates(rng, -1e-6)
         assert separation(A, B, normal) <= 0
+
+
+def test_hulls_are_farther_apart_than_something_whatever_direction_is_tried_first():
+    rng = np.random.default_rng(4)
+    answers = {True: 0, False: 0}
+    normal = np.zeros(3)
+    for _ in range(400):
+        A, B = rng.normal(size=(8, 3)), rng.normal(size=(8, 3)) + rng.uniform(0, 4, 3)
+        distance = max(separation(A, B, np.empty(3)), 0.0)
+        for reach in (0.0, 0.5 * distance, max(distance - 1e-7, 0.0), distance + 1e-7, 2 * distance + 0.1):
+            for first in (normal, np.zeros(3), rng.normal(size=3)):
+                found = farther(A, B, reach, first)
+                assert found == (distance > reach)
+                if found:
+                    unit = first / np.linalg.norm(first)
+                    assert (A @ unit).min() - (B @ unit).max() > reach - 1e-12
+        answers[bool(distance > 0)] += 1
+    assert min(answers.values()) > 30

@@ -15,9 +15,10 @@ from certifier.partition.cell import Cell
 from certifier.partition.certification import CellCertification
 from certifier.partition.hulls import gaps
 from certifier.partition.search import NARROW_APART, NARROW_COARSE, NARROW_CUT, Search
+from certifier.partition.shared import Shared
 from certifier.partition.together import volumes_of
 from certifier.partition.tree import Node, OpenCell
-from certifier.proof.partition import OPEN
+from certifier.proof.partition import OPEN, PLANE
 from tests.certifier.scenes import box, cube, planar_arm
 from tests.certifier.truth import distances_at
 
@@ -71,21 +72,57 @@ def test_cells_of_bodies_that_seven_joints_move_are_cut_on_for_volumes_that_are_
     assert (looking._cut_for(cell, ball, found) is not None) == cut
 
 
-def test_narrow_cells_of_volumes_that_faces_separate_stay_open_and_are_not_tried_with_the_bodies(monkeypatch):
+def test_narrow_cells_of_volumes_that_faces_separate_are_not_cut_for_the_bodies(monkeypatch):
     monkeypatch.setattr(search, "NARROW_APART", np.radians(20.0))
     scene = planar_arm(7, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (4.0, 5.8, 0.0)))
     certification = CellCertification(replace(scene, pairs=scene.pairs[-1:]), cube(scene, 0.0, 0.25))
-    chosen = {}
+    cuts = {}
     for faces in (True, False):
         keep = certification._area.center[None] if faces else None
         looking, root = Search(*_given(certification), keep), Node()
         assert (looking.parted is not None) == faces
         looking.run([OpenCell(root, certification._area.lower, certification._area.upper)], 600)
         nodes = list(root.preorder())
-        chosen[faces] = {node.choice for node in nodes if node.plane is not None}
+        cuts[faces] = {node.kind for node in nodes if node.children}
         assert any(node.kind == OPEN for node in nodes)
-    assert 0 not in chosen[True]
-    assert 0 in chosen[False], "without faces, the bodies themselves are tried"
+        if faces:
+            moving = set(looking.parted.joints)
+    assert cuts[True] <= moving < set(range(7))
+    assert not cuts[False] <= moving, "without faces, cells are cut for the bodies themselves"
+
+
+def test_narrow_cells_of_volumes_that_faces_separate_are_settled_where_slimmer_volumes_have_a_plane():
+    scene = planar_arm(7, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (4.0, 5.8, 0.0)))
+    certification = CellCertification(replace(scene, pairs=scene.pairs[-1:]), cube(scene, 0.0, 0.25))
+    looking = Search(*_given(certification), certification._area.center[None])
+    place = looking._levels.index(looking.parted)
+    for half, kind in ((0.01, PLANE), (0.25, OPEN)):
+        node, corner = Node(), np.full(7, half)
+        looking._try_slimmer(Cell.at(looking._area, node, -corner, corner, np.zeros((1, 7))), np.zeros(7), place)
+        assert node.kind == kind
+        assert node.kind == OPEN or node.choice in looking._choices[:place]
+
+
+def wedge():
+    """The area of a wedge beside an arm of two bars and a block: in joint 1, it is much narrower than the joint limits."""
+    scene, _ = apart(2, (2.4, 0.0, 0.0))
+    C, d = np.array([[1.0, 0.0], [-1.0, 0.0], [0.3, 1.0]]), np.array([0.02, 0.01, 0.2])
+    return Area.of(scene, scene.polytope(C, d), 0)
+
+
+def test_a_side_that_the_polytope_leaves_free_is_cut_off_where_a_plane_was_not_proved():
+    area = wedge()
+    scene = area.scene
+    looking = Search(area, Shared(area), volumes_of(scene, scene.pairs))
+    cell = Cell.at(area, Node(), np.array([-0.01, -0.3]), np.array([1.0, 0.19]), area.samples)
+    start = area.center
+    cut = looking._spare(cell, looking.bodies, start, Undecided(area.samples, None, np.zeros(0), 1))
+    assert cut.joint == 0
+    assert area.samples[:, 0].max() < 0.02 < cut.value < 0.03
+    no_plane = Undecided(area.samples, area.samples[:1], np.ones(1))
+    assert looking._spare(cell, looking.bodies, start, no_plane) is None, "what lies beside the polytope is no reason for that"
+    tight = Cell.at(area, Node(), np.array([-0.01, -0.3]), np.array([0.02, 0.19]), area.samples)
+    assert looking._spare(tight, looking.bodies, start, Undecided(area.samples, None, np.zeros(0), 1)) is None
 
 
 def _given(certification):

@@ -10,7 +10,7 @@ from benchmarks import catalogue
 from certifier.model import WORLD, Joint, JointKind, Pair, Scene
 from certifier.outcome import Guarantee
 from certifier.pair.collisions import in_collision
-from certifier.polytopes.ellipsoid import volume, volume_in_q
+from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume, volume_in_q
 from certifier.polytopes.gibbs import uniform_in_q
 from certifier.polytopes.proved import needed_faces
 from certifier.seeding import iris as iris_module
@@ -104,7 +104,7 @@ def test_iris_keeps_its_promise_and_the_seed(count, random_seed):
 
 def trimmed(scene, polytope, points, options):
     trim = Trim(scene, polytope, points, options, np.random.default_rng(0))
-    trim.by_samples()
+    trim.by_samples(0.0)
     trim.by_descents()
     return trim
 
@@ -140,8 +140,8 @@ def test_a_proposal_for_an_arm_is_large_and_nearly_free(name):
 
 
 def test_what_may_collide_is_not_called_sampled(monkeypatch):
-    for step in ("by_samples", "by_descents"):
-        monkeypatch.setattr(Trim, step, lambda _: None)
+    monkeypatch.setattr(Trim, "by_samples", lambda trim, _: inscribed_ellipsoid(trim.polytope))
+    monkeypatch.setattr(Trim, "by_descents", lambda _: None)
     account = iris(posts(1), np.zeros((1, 2)), SeedOptions())[2]
     assert account["guarantee"] == Guarantee.NONE
     assert account["warnings"] == ["more than 0.001 of the polytope may collide: too many faces would be needed"]
@@ -181,7 +181,7 @@ def test_a_sliver_is_tried_again_and_the_larger_one_stays(monkeypatch, first, ke
     def told(*args):
         this = real(*args)
         if not found:
-            this = replace(this, kept=kept, ellipsoid=replace(this.ellipsoid, shape=first * this.ellipsoid.shape))
+            this = replace(this, kept=kept, volume=first * this.volume)
         found.append(this)
         return this
 
@@ -192,3 +192,14 @@ def test_a_sliver_is_tried_again_and_the_larger_one_stays(monkeypatch, first, ke
     expected = needed_faces(scene, polytope.C[: -2 * scene.n], polytope.d[: -2 * scene.n], points)
     np.testing.assert_array_equal(C, expected[0])
     np.testing.assert_array_equal(d, expected[1])
+
+
+def test_a_try_that_cannot_be_larger_ends_at_once():
+    scene = posts(3)
+    points, options = np.zeros((1, 2)), SeedOptions(q=(0.0, 0.0))
+    whole = iris_module._found(scene, points, options, np.random.default_rng(0), 0.0)
+    assert whole is not None
+    again = iris_module._found(scene, points, options, np.random.default_rng(0), 0.999 * whole.volume)
+    assert again is not None
+    assert again.volume == whole.volume
+    assert iris_module._found(scene, points, options, np.random.default_rng(0), 1.001 * whole.volume) is None
