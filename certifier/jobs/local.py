@@ -12,6 +12,7 @@ from typing import Any
 from certifier import stored
 from certifier.errors import CirisError
 from certifier.growth.actions import Action, Candidate, Certify, Failed, Finish, Outcomes, Propose, Report, Step, Transition
+from certifier.growth.machine import NEARBY
 from certifier.growth.options import GrowthOptions
 from certifier.growth.pairs import alike
 from certifier.growth.state import GrowthState
@@ -209,8 +210,11 @@ class _Memory:
         except CirisError as error:
             if error.code != "child_timeout":
                 raise
-            finish = late(self.scene, self.state, self.candidate is not None, self.told)
-            raise refused(finish, None) or error from None
+            raise self._ended(error) from None
+
+    def _ended(self, error: CirisError) -> CirisError:
+        """Returns why growth ends where its time has run out: the reason if there is no region yet, the error otherwise."""
+        return refused(late(self.scene, self.state, self.candidate is not None, self.told), None) or error
 
     def _certify(self, action: Certify) -> Outcomes:
         carried = None if self.former is None else self.former.carried
@@ -231,6 +235,8 @@ class _Memory:
                 failures += result.outcome is not Outcome.CERTIFIED
                 if failures == action.failures:
                     break
+                if self.passed >= 1 and action.label != NEARBY:
+                    raise self._ended(CirisError("child_timeout", "the deadline was reached", hint="give it more time"))
         outcomes = [result.outcome for parts in found.values() for result in parts]
         self.tell("iteration", {**said, "state": combine(outcomes).value})
         reached = [(index, r.outcome, r.weakness, r.open_cells) for index, parts in found.items() for r in parts]
@@ -260,8 +266,8 @@ def grow(
 
     Args:
         tell: receives reports of what happens.
-        deadline_s: after this many seconds growth ends with the best region so far, as soon as the action under way is carried out; None
-            for no deadline.
+        deadline_s: after this many seconds growth ends with the best region so far, as soon as the pairs that are being certified are
+            done; None for no deadline. The box about the seed is certified in any case.
         deliver: receives regions before the last one, which is returned. It does not get all of them: verifying their proofs takes at most
             a fifth of the time (``REST``). None for the last one alone.
 

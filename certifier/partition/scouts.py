@@ -17,6 +17,8 @@ from certifier.partition.tree import Node
 SCOUTS, AMONG, STEPS = 64, 16, 12
 """A search for contacts starts from SCOUTS points and takes STEPS steps. Of AMONG times as many points, half of them samples and half on
 the boundary, these are the ones where bodies are nearest."""
+FIRST, HOPELESS = 8, 0.03
+"""If the first FIRST descents come no nearer than HOPELESS, relative to the bodies' extent, the others are left out."""
 NEAR_CONTACTS = 48
 """To find how far a contact reaches, this many configurations about it are looked at, at each of SCALES."""
 SCALES = (0.5, 0.2, 0.07, 0.02)
@@ -30,8 +32,12 @@ def scouted(area: Area, bodies: Bodies, seed: int) -> list[Array]:
     targets = np.where(rng.random((count, len(area.lower))) < 0.5, area.lower, area.upper)
     samples = area.samples[rng.permutation(len(area.samples))[:count]]
     X = np.concatenate([samples, chords(cell.inside.C, cell.inside.d, area.center, targets, count, seed)])
-    for place in np.argsort(gaps(*bodies.hulls, X), kind="stable")[:SCOUTS]:
+    nearest = np.inf
+    for number, place in enumerate(np.argsort(gaps(*bodies.hulls, X), kind="stable")[:SCOUTS]):
+        if number == FIRST and nearest > HOPELESS * bodies.extent:
+            break
         s, gap = bodies.approached(cell, X[place], STEPS)
+        nearest = min(nearest, gap)
         if gap <= 0:
             contacts.append(s)
     return contacts
