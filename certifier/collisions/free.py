@@ -78,10 +78,9 @@ def _apart_along(bodies: Bodies, seen: Seen, pair: int, R: Array, p: Array, norm
     for v in range(bodies.first[a], bodies.first[a + 1]):
         along = normal[0] * bodies.vertices[v, 0] + normal[1] * bodies.vertices[v, 1] + normal[2] * bodies.vertices[v, 2]
         gap = min(gap, along)
-    way, turned = normal, np.zeros(3)  # in the world, then in the frame of the second one's link
-    offset = 0.0
+    turned, offset = np.zeros(3), 0.0  # the direction in the frame of the second one's link, and how far that is along it
     for i in range(3):
-        world = R[here, i, 0] * way[0] + R[here, i, 1] * way[1] + R[here, i, 2] * way[2]
+        world = R[here, i, 0] * normal[0] + R[here, i, 1] * normal[1] + R[here, i, 2] * normal[2]
         offset += world * (p[there, i] - p[here, i])
         for j in range(3):
             turned[j] += world * R[there, i, j]

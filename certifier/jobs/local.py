@@ -236,7 +236,7 @@ class _Memory:
                 if failures == action.failures:
                     break
                 if self.passed >= 1 and action.label != NEARBY:
-                    raise self._ended(CirisError("child_timeout", "the deadline was reached", hint="give it more time"))
+                    raise self._ended(CirisError("child_timeout", "the deadline was reached", field="deadline", hint="give it more time"))
         outcomes = [result.outcome for parts in found.values() for result in parts]
         self.tell("iteration", {**said, "state": combine(outcomes).value})
         reached = [(index, r.outcome, r.weakness, r.open_cells) for index, parts in found.items() for r in parts]

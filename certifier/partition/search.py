@@ -264,7 +264,10 @@ class Search:
             return None
         joints = np.array(bodies.joints)
         axes = np.eye(len(start))[joints]
-        ends = maximise(cell.inside.C, cell.inside.d, np.concatenate([axes, -axes]), start)[0]
+        try:
+            ends = maximise(cell.inside.C, cell.inside.d, np.concatenate([axes, -axes]), start)[0]
+        except np.linalg.LinAlgError:  # Rounding stands in the way, and the middle is a place as well.
+            return None
         lower, upper = cell.lower[joints], cell.upper[joints]
         most, least = (part[np.arange(len(joints)), joints] for part in np.split(ends, 2))
         margin = BESIDE * (most - least) + BEYOND * (upper - lower)

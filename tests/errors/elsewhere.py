@@ -18,6 +18,7 @@ TESTED = {
     "certifier/conditioned.py:_wrong": "tests/certifier/test_conditioned.py",
     "certifier/conditioned.py:with_conditions": "tests/certifier/test_conditioned.py",
     "certifier/growth/refusal.py:refusal": "tests/certifier/jobs/test_recertify.py",
+    "certifier/jobs/local.py:_certify": "tests/certifier/growth/test_whole.py",
     "certifier/jobs/motion.py:certify": "tests/certifier/motion/test_clearance.py",
     "certifier/jobs/parallel.py:side_by_side": "tests/certifier/jobs/test_parallel.py",
     "certifier/map/free_set.py:free_set": "tests/certifier/map/test_free_set.py",
