@@ -17,7 +17,7 @@ import yaml
 from certifier import stored
 from certifier.errors import CirisError
 from certifier.growth import whole
-from certifier.growth.actions import Certify, Finish, Outcomes, Propose
+from certifier.growth.actions import Certify, Failed, Finish, Outcomes, Propose
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import ENOUGH, GrowthOptions
 from certifier.growth.state import Best, GrowthState, Start, Whole
@@ -532,6 +532,22 @@ def test_a_round_ends_with_the_pair_in_which_the_deadline_passes(monkeypatch, de
     with pytest.raises(CirisError, match="the deadline was reached"):
         grow(scene, asked, tell, deadline_s=10.0)
     assert len(told) == 1
+
+    # After the box about the seed, the first pair of the proposal is the last one.
+    board = planar_arm(2, box("world/board", WORLD, (4.0, 0.2, 0.3), (0.0, 0.17, 0.0)))
+    codes, save = [], local._Memory.save
+
+    def saved(job, turn, decision):
+        codes.extend([turn.report.error.code] if isinstance(turn.report, Failed) else [])
+        return save(job, turn, decision)
+
+    monkeypatch.setattr(local._Memory, "save", saved)
+    told.clear()
+    clock[0] = -10.0 * len(board.pairs)
+    region = grow(board, GrowthOptions(seed={"q": [0.0, 0.0]}), tell, deadline_s=10.0 * (1 + len(board.pairs)))
+    assert region.reason == "the deadline was reached; the region is a small box about the seed"
+    assert told == [0] * len(board.pairs) + [1]
+    assert codes == ["child_timeout"]
 
 
 def test_regions_are_delivered_as_they_are_certified_and_time_is_left_for_growing(monkeypatch, demanding):
