@@ -42,10 +42,17 @@ def _far(bodies: Bodies, seen: Seen, pair: int, R: Array, p: Array, more: float)
 @njit(cache=True)
 def _distance(bodies: Bodies, seen: Seen, pair: int, R: Array, p: Array) -> float:
     """Returns how far a pair's padded bodies are apart, metres; 0 or less where they touch."""
+    A, B = _vertices(bodies, seen, pair, R, p)
+    return separation(A, B, np.empty(3)) - seen.reaches[pair]
+
+
+@njit(cache=True)
+def _vertices(bodies: Bodies, seen: Seen, pair: int, R: Array, p: Array) -> tuple[Array, Array]:
+    """Returns where the vertices of a pair's geometries are in the frame of the first one's link, (V, 3) and (W, 3)."""
     a, b = seen.pairs[pair, 0], seen.pairs[pair, 1]
     points = np.empty((bodies.first[b + 1] - bodies.first[b], 3))
     place(bodies, b, bodies.links[a], R, p, points)
-    return separation(bodies.vertices[bodies.first[a] : bodies.first[a + 1]], points, np.empty(3)) - seen.reaches[pair]
+    return bodies.vertices[bodies.first[a] : bodies.first[a + 1]], points
 
 
 @njit(cache=True)
@@ -58,36 +65,13 @@ def _touches(bodies: Bodies, seen: Seen, q: Array, R: Array, p: Array, order: np
     place_links(bodies, q, R, p)
     for k in range(len(order)):
         pair = order[k]
-        if _far(bodies, seen, pair, R, p, 0.0) or _apart_along(bodies, seen, pair, R, p, normals[pair]):
+        if _far(bodies, seen, pair, R, p, 0.0):
             continue
-        a, b = seen.pairs[pair, 0], seen.pairs[pair, 1]
-        points = np.empty((bodies.first[b + 1] - bodies.first[b], 3))
-        place(bodies, b, bodies.links[a], R, p, points)
-        if not farther(bodies.vertices[bodies.first[a] : bodies.first[a + 1]], points, seen.reaches[pair], normals[pair]):
+        A, B = _vertices(bodies, seen, pair, R, p)
+        if not farther(A, B, seen.reaches[pair], normals[pair]):
             _to_front(order, k)
             return True
     return False
-
-
-@njit(cache=True)
-def _apart_along(bodies: Bodies, seen: Seen, pair: int, R: Array, p: Array, normal: Array) -> bool:
-    """Says whether a pair's padded bodies are apart along a direction in the frame of the first one's link, (3,), of length 1 or 0."""
-    a, b = seen.pairs[pair, 0], seen.pairs[pair, 1]
-    here, there = bodies.links[a], bodies.links[b]
-    gap = np.inf
-    for v in range(bodies.first[a], bodies.first[a + 1]):
-        along = normal[0] * bodies.vertices[v, 0] + normal[1] * bodies.vertices[v, 1] + normal[2] * bodies.vertices[v, 2]
-        gap = min(gap, along)
-    turned, offset = np.zeros(3), 0.0  # the direction in the frame of the second one's link, and how far that is along it
-    for i in range(3):
-        world = R[here, i, 0] * normal[0] + R[here, i, 1] * normal[1] + R[here, i, 2] * normal[2]
-        offset += world * (p[there, i] - p[here, i])
-        for j in range(3):
-            turned[j] += world * R[there, i, j]
-    most = -np.inf
-    for v in range(bodies.first[b], bodies.first[b + 1]):
-        most = max(most, turned[0] * bodies.vertices[v, 0] + turned[1] * bodies.vertices[v, 1] + turned[2] * bodies.vertices[v, 2])
-    return gap - most - offset > seen.reaches[pair]
 
 
 @njit(cache=True)
@@ -112,7 +96,7 @@ def distance_at(bodies: Bodies, seen: Seen, pair: int, q: Array, R: Array, p: Ar
 @njit(cache=True)
 def touching_at(bodies: Bodies, seen: Seen, q: Array, order: np.ndarray) -> int:
     """Returns the first pair that is found to touch at joint positions q, (n,), or -1. For ``order`` see :func:`free_at`."""
-    return order[0] if not free_at(bodies, seen, q, order) else -1
+    return -1 if free_at(bodies, seen, q, order) else order[0]
 
 
 @njit(cache=True)

@@ -15,7 +15,7 @@ from certifier.jobs.share import SampledProposal
 from certifier.model import SCHEMA_VERSION, Array, Polytope, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume, volume_in_q
-from certifier.polytopes.polytope import bounds, chebyshev_center, drop_redundant, support
+from certifier.polytopes.polytope import bounds, chebyshev_center, support, without_redundant
 from certifier.proof.region import Implied, RegionProof, read_part
 from certifier.proof.separation import Separation, digest
 from certifier.verify import uncovered
@@ -73,8 +73,7 @@ def certified_region(
         RegionError: the polytope is empty or unbounded.
     """
     proofs = proofs | {other: proofs[index] for index, others in candidate.together.items() for other in others}
-    kept = drop_redundant(candidate.polytope, fixed=2 * scene.n)
-    polytope = Polytope(candidate.polytope.C[kept], candidate.polytope.d[kept])
+    polytope = without_redundant(candidate.polytope, fixed=2 * scene.n)
     C, d = polytope.C, polytope.d
     interior = chebyshev_center(polytope)[0] if candidate.center is None else candidate.center
     bound = archimedean(polytope)

@@ -223,9 +223,9 @@ class Search:
             if isinstance(found, Separated):
                 self._separated(cell, level, found)
                 return None
-            spare = self._spare(cell, bodies, start, found)
-            if spare is not None:
-                return spare
+            beside = self._beside_polytope(cell, bodies, start, found)
+            if beside is not None:
+                return beside
             joint = self._cut_for(cell, bodies, found)
             if joint is not None:
                 return _Cut(joint, found.points)
@@ -245,7 +245,7 @@ class Search:
             if nearest is not None and nearest[1] * self._area.finer < TOUCH * self.bodies.extent:
                 report.narrow.append(nearest[0][None])
                 return None
-        return self._spare(cell, self.bodies, start, found) or _Cut(self._cut(cell, self.bodies, found), found.points)
+        return self._beside_polytope(cell, self.bodies, start, found) or _Cut(self._cut(cell, self.bodies, found), found.points)
 
     def _try_slimmer(self, cell: Cell, start: Array, level: int) -> None:
         """Settles a cell, if it can be, with slimmer volumes than those of this level."""
@@ -255,7 +255,7 @@ class Search:
                 self._separated(cell, slimmer, found)
                 return
 
-    def _spare(self, cell: Cell, bodies: Bodies, start: Array, found: Undecided) -> _Cut | None:
+    def _beside_polytope(self, cell: Cell, bodies: Bodies, start: Array, found: Undecided) -> _Cut | None:
         """Returns how to cut off a side of a cell that the polytope leaves free; None where there was no plane to prove, or hardly a side.
 
         A proof is about all of the cell's box, and takes pieces for what lies beside the polytope as well.

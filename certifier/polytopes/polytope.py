@@ -189,6 +189,12 @@ def drop_redundant(polytope: Polytope, fixed: int = 0, inside: Array | None = No
     return rows[needed]
 
 
+def without_redundant(polytope: Polytope, fixed: int = 0) -> Polytope:
+    """Returns the same set with the rows of :func:`drop_redundant` alone; its arguments and errors are the same."""
+    kept = drop_redundant(polytope, fixed)
+    return Polytope(polytope.C[kept], polytope.d[kept])
+
+
 @lru_cache(maxsize=16)
 def _directions(n: int) -> Array:
     """Returns random directions (_RAYS, n), which are always the same."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from certifier.model import Array, Polytope
-from certifier.polytopes.polytope import drop_redundant
+from certifier.polytopes.polytope import without_redundant
 
 
 def pushed(polytope: Polytope, center: Array, reach: float, within: Polytope) -> Polytope:
@@ -19,5 +19,4 @@ def pushed(polytope: Polytope, center: Array, reach: float, within: Polytope) ->
     limits = 2 * len(center)
     C, d = polytope.C[:-limits], polytope.d[:-limits]
     moved = Polytope(np.concatenate([C, within.C]), np.concatenate([C @ center + reach * (d - C @ center), within.d]))
-    kept = drop_redundant(moved, fixed=limits)
-    return Polytope(moved.C[kept], moved.d[kept])
+    return without_redundant(moved, fixed=limits)

@@ -19,6 +19,7 @@ import numpy as np
 from certifier.isolation.telling import tell
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Polytope, Scene, Volume
+from certifier.pair.broad_phase import Volumes
 from certifier.partition.area import Area
 from certifier.partition.bodies import Bodies
 from certifier.partition.coarse import slim_volumes
@@ -27,7 +28,7 @@ from certifier.partition.parted import long_pairs
 from certifier.partition.scouts import scouted, with_others
 from certifier.partition.together import THIN, gaps_between, together, volumes_of
 from certifier.polytopes.cutting import BARELY, cut, samples_of
-from certifier.polytopes.polytope import drop_redundant
+from certifier.polytopes.polytope import without_redundant
 
 DISTANCE, PART = 0.01, 0.4
 """Metres that bodies keep between them, or this part of their distance at the points to keep, if that is less."""
@@ -37,8 +38,6 @@ TOUCHING = 0.01
 """Slim volumes that touch at more than this share of the samples keep nothing between them: faces before them would lose too much."""
 ROUNDS, LOOKS = 24, 2
 """In at most ROUNDS rounds, all long pairs are looked at LOOKS times at most, and in between those that had contacts."""
-
-Volumes = tuple[Volume, Volume]
 
 
 def without_contacts(scene: Scene, polytope: Polytope, points: Array) -> Polytope:
@@ -63,8 +62,7 @@ def without_contacts(scene: Scene, polytope: Polytope, points: Array) -> Polytop
             made = cut(scene, polytope, points, [(joints, contacts, 1.0) for _, joints, contacts in found], around, BARELY)
             if made.polytope is None or made.polytope is polytope:
                 break
-            kept = drop_redundant(made.polytope, fixed=2 * scene.n)
-            polytope, around = Polytope(made.polytope.C[kept], made.polytope.d[kept]), made.around
+            polytope, around = without_redundant(made.polytope, fixed=2 * scene.n), made.around
             active = [piece for piece, _, _ in found]
         elif active is all_pieces or looks == LOOKS:
             break

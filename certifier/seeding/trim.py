@@ -22,7 +22,7 @@ from certifier.model import Array, Pair, Polytope, Scene
 from certifier.polytopes.cutting import cut
 from certifier.polytopes.ellipsoid import Ellipsoid, inscribed_ellipsoid
 from certifier.polytopes.gibbs import uniform_in_q
-from certifier.polytopes.polytope import drop_redundant
+from certifier.polytopes.polytope import without_redundant
 from certifier.polytopes.sampling import hit_and_run
 from certifier.seeding.coarse_pairs import coarse_pairs_of, with_coarse_pairs
 from certifier.seeding.contacts import Contacts
@@ -109,8 +109,7 @@ class Trim:
             made = cut(self._scene, self.polytope, self._points, corners, self._around)
             if made.polytope is None or made.polytope is self.polytope:
                 break
-            kept = drop_redundant(made.polytope, fixed=2 * self._scene.n)
-            self.polytope, self._around = Polytope(made.polytope.C[kept], made.polytope.d[kept]), made.around
+            self.polytope, self._around = without_redundant(made.polytope, fixed=2 * self._scene.n), made.around
         return False
 
 

@@ -24,7 +24,7 @@ from scipy.optimize import nnls
 
 from certifier.model import Array, Polytope, Scene
 from certifier.pair.result import Weakness
-from certifier.polytopes.polytope import bounds, drop_redundant
+from certifier.polytopes.polytope import bounds, without_redundant
 from certifier.polytopes.proved import cleaned
 
 BACKOFF, BACKOFF_GROWTH, LARGEST_BACKOFF = 0.2, 1.2, 0.6
@@ -119,8 +119,7 @@ def contract(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: Array, 
         C.append(rows)
         d.append(offsets)
     limited = scene.polytope(np.concatenate(C), np.concatenate(d))
-    kept = drop_redundant(limited, fixed=limits)
-    return Polytope(limited.C[kept], limited.d[kept])
+    return without_redundant(limited, fixed=limits)
 
 
 def _face(ellipsoid: Measure, keep: Array, failure: Failure, near: float) -> tuple[Array, Array] | None:

@@ -116,13 +116,13 @@ def test_a_side_that_the_polytope_leaves_free_is_cut_off_where_a_plane_was_not_p
     looking = Search(area, Shared(area), volumes_of(scene, scene.pairs))
     cell = Cell.at(area, Node(), np.array([-0.01, -0.3]), np.array([1.0, 0.19]), area.samples)
     start = area.center
-    cut = looking._spare(cell, looking.bodies, start, Undecided(area.samples, None, np.zeros(0), 1))
+    cut = looking._beside_polytope(cell, looking.bodies, start, Undecided(area.samples, None, np.zeros(0), 1))
     assert cut.joint == 0
     assert area.samples[:, 0].max() < 0.02 < cut.value < 0.03
     no_plane = Undecided(area.samples, area.samples[:1], np.ones(1))
-    assert looking._spare(cell, looking.bodies, start, no_plane) is None, "what lies beside the polytope is no reason for that"
+    assert looking._beside_polytope(cell, looking.bodies, start, no_plane) is None, "what lies beside the polytope is no reason for that"
     tight = Cell.at(area, Node(), np.array([-0.01, -0.3]), np.array([0.02, 0.19]), area.samples)
-    assert looking._spare(tight, looking.bodies, start, Undecided(area.samples, None, np.zeros(0), 1)) is None
+    assert looking._beside_polytope(tight, looking.bodies, start, Undecided(area.samples, None, np.zeros(0), 1)) is None
 
 
 def _given(certification):
