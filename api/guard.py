@@ -21,6 +21,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from api.access import Keyring, presented
 from api.limits import Buckets
+from api.oidc import CALLBACK
 from certifier.errors import CirisError
 from db.session import UNAVAILABLE
 
@@ -29,10 +30,12 @@ BODY_BYTES = 16 * 2**20
 UPLOAD_BYTES = 64 * 2**20
 UPLOADS = "/v1/scenes"
 HEALTH = frozenset({"/healthz", "/readyz"})
-PUBLIC = HEALTH | {"/login", "/login/oidc", "/login/oidc/callback", "/login/project", "/logout"}
+PUBLIC = HEALTH | {"/login", "/login/oidc", CALLBACK, "/login/project", "/logout"}
 SAME_SITE = frozenset({"same-origin", "none"})
 """A browser says so of requests that come from the service's own pages, or from the person: by a bookmark or the address line."""
 STATIC = "/static/"
+SIGN_INS_PER_SECOND = 5.0
+"""One address may come back from the identity provider so often, for long. Each time the service asks the provider, who knows only it."""
 WATCHED = frozenset({"/metrics"})
 """Monitoring asks for these. They are answered while the database hangs."""
 
@@ -68,7 +71,7 @@ class Guard:
         self, app: ASGIApp, keyring: Keyring, hosts: frozenset[str] | None, rate: float, respond: Callable[[Request, Exception], Response]
     ) -> None:
         self._app, self._keyring, self._hosts, self._respond = app, keyring, hosts, respond
-        self._keys, self._addresses = Buckets(rate), Buckets(rate)
+        self._keys, self._addresses, self._sign_ins = Buckets(rate), Buckets(rate), Buckets(SIGN_INS_PER_SECOND)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -114,6 +117,8 @@ class Guard:
         caller = None if public else await self._keyring.caller(given, patient=scope["path"] not in WATCHED)
         id = caller and caller.id
         wait = self._keys.take(id) if id else self._addresses.take(_network(scope))
+        if wait == 0 and scope["path"] == CALLBACK:
+            wait = self._sign_ins.take(_network(scope))
         if wait > 0:
             raise TooManyRequests(wait)
         if caller is None and not public:

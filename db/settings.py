@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, ValidationInfo
@@ -19,14 +19,17 @@ from sqlalchemy.exc import ArgumentError
 from certifier.errors import CirisError
 from db import machine
 
+SPARE = 1
+"""A solve worker has this many processes more than work at a time. They do pieces of new jobs (workers.spare)."""
+
 
 def _data_dir() -> Path:
     home = os.environ.get("XDG_DATA_HOME")
     return (Path(home) if home else Path.home() / ".local" / "share") / "ciris"
 
 
-def _memory_of_a_process() -> int:
-    return machine.memory_bytes() // machine.cores()
+def _memory_of_a_process(given: dict[str, Any]) -> int:
+    return machine.memory_bytes() // (given.get("solve_processes", machine.cores()) + SPARE)
 
 
 def _networks(given: object) -> object:
@@ -170,7 +173,8 @@ class Settings(BaseSettings):
     child_memory_bytes: int = 16 << 30
     """The process that runs a seeding or a check on request may have an address space of this many bytes."""
     pair_memory_bytes: int = Field(default_factory=_memory_of_a_process)
-    """A job with a pair that needs more bytes of memory than this is refused. Default: the memory there is, divided by the cores."""
+    """A job with a pair that needs more bytes of memory than this is refused. Default: the memory there is, divided by the processes of a
+    solve worker."""
     max_jobs_per_project: int = Field(default=2000, ge=1)
     """One project may have this many unfinished jobs, so that nobody gets more by making keys."""
     max_jobs_per_key: int = Field(default=1000, ge=1)

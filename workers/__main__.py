@@ -16,8 +16,6 @@ from typing import Any
 
 NURSERY_S = 60.0
 """A process that solves takes work when it has what makes proposals, or after this many seconds."""
-SPARE = 1
-"""A solve worker has this many processes more, which do pieces of new jobs while the others work (workers.spare)."""
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 
@@ -38,7 +36,7 @@ def main() -> None:
     from certifier.orphans import die_with_parent
     from db import logs, traces
     from db.session import check_version, database
-    from db.settings import settings
+    from db.settings import SPARE, settings
     from db.workers import WorkerKind
     from workers.app import CONTROL, SOLVE, celery_app
     from workers.heartbeat import Heartbeat

@@ -22,6 +22,8 @@ from sqlalchemy import select, update
 from api import oidc
 from api.access import COOKIE, KEYS_SECONDS
 from api.app import create_app
+from api.guard import SIGN_INS_PER_SECOND
+from api.limits import BURST_SECONDS
 from certifier.errors import CirisError
 from certifier.model import Scene
 from db import audit, grants, keys, projects
@@ -590,6 +592,20 @@ def test_a_slow_provider_holds_nobody_else(fooled: TestClient, liar: Liar, datab
         assert {future.result()[0] for future in waiting} == {503}
         assert time.monotonic() - began < 10.0
     assert len(liar.asked) == 1, "it was asked once for all of them"
+
+
+def test_nobody_has_the_service_ask_the_provider_without_end(fooled: TestClient, liar: Liar) -> None:
+    liar.status, sent = 400, attempt(fooled)
+    cookies, began = dict(fooled.cookies), time.monotonic()
+    answers = []
+    for _ in range(40):
+        fooled.cookies.update(cookies)
+        answers.append(fooled.get("/login/oidc/callback", params={"code": "c", "state": sent["state"]}))
+    allowed = SIGN_INS_PER_SECOND * (BURST_SECONDS + time.monotonic() - began)
+    assert {answer.status_code for answer in answers} == {403, 429}
+    assert len(liar.forms) <= allowed + 1
+    assert answers[-1].headers["retry-after"] == "1"
+    assert fooled.get("/login").status_code == 200, "other pages are answered"
 
 
 def test_a_provider_that_is_away_is_said_so(database: Database, queue: Queue, environment: pytest.MonkeyPatch) -> None:

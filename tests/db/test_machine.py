@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from certifier.errors import CirisError
 from db import machine
+from db.settings import Settings, chosen
 
 GIB = 2**30
 
@@ -69,3 +71,14 @@ def test_version_1_without_limits(tmp_path: Path) -> None:
     own = "4:memory:/a\n3:cpu,cpuacct:/a\n"
     time = {"cpu,cpuacct/a/cpu.cfs_quota_us": "-1", "cpu,cpuacct/a/cpu.cfs_period_us": "100000"}
     assert look(tmp_path, own, {"memory/a/memory.limit_in_bytes": "9223372036854771712", **time}) == (8, 16.0)
+
+
+def test_a_pair_may_need_what_every_process_of_a_worker_can_have_at_the_same_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A worker of two processes has a third one, for new jobs."""
+    monkeypatch.setattr(machine, "memory_bytes", lambda: 6 * GIB)
+    assert Settings(solve_processes=5).pair_memory_bytes == GIB
+    assert Settings(solve_processes=2).pair_memory_bytes == 2 * GIB
+    monkeypatch.setenv("CIRIS_SOLVE_PROCESSES", "nothing")
+    with pytest.raises(CirisError, match="valid integer") as refused:
+        chosen()
+    assert refused.value.field == "CIRIS_SOLVE_PROCESSES"

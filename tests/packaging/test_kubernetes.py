@@ -17,7 +17,7 @@ import redis
 import yaml
 
 from certifier.orphans import die_with_parent
-from db.settings import Settings
+from db.settings import SPARE, Settings
 from tests.workers.service import eventually
 from workers.processes import queue_server_command
 
@@ -178,6 +178,9 @@ def test_settings_exist_and_secrets_are_referred_to() -> None:
     named = set(config) | {entry["name"] for name in OURS for entry in CONTAINERS[name]["env"]}
     assert {name for name in named if name.startswith("CIRIS_")} <= {f"CIRIS_{name.upper()}" for name in Settings.model_fields}
     assert "CIRIS_TRUSTED_PROXIES" in config, "without the Ingress in it, all callers without a key have one budget"
+    limits = CONTAINERS["solve"]["resources"]["limits"]
+    part = int(limits["memory"].removesuffix("Gi")) * 2**30 // (int(limits["cpu"]) + SPARE)
+    assert int(config["CIRIS_PAIR_MEMORY_BYTES"]) == part, "whichever pod decides about a job, a solve pod does its pairs"
     assert not any(document["kind"] == "Secret" for document in DOCUMENTS)
     for container in CONTAINERS.values():
         for entry in container.get("env", []):
