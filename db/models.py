@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import secrets
 from datetime import datetime
+from functools import partial
 from typing import Any, ClassVar
 
 from sqlalchemy import JSON, BigInteger, ForeignKey, Index, LargeBinary, MetaData, String, Text, UniqueConstraint, text
@@ -50,6 +52,8 @@ class ProjectRow(Base):
     max_solver_seconds: Mapped[float | None]
     """No new job is taken in a calendar month in which solvers have worked for it this long; None for any time."""
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
+    events_key: Mapped[bytes] = mapped_column(default=partial(secrets.token_bytes, 16))
+    """Random, and shown to nobody. By it the project's people see ids of events (db.event_ids)."""
 
 
 class Owned:

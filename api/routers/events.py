@@ -14,11 +14,13 @@ from api.access import READ, Db, presented
 from api.reading import ReadingRoute
 from api.schemas.common import MAX_INT, JobGiven, Listed
 from api.schemas.jobs import Event, EventList, ProjectEvent, ProjectEventList
-from db import events, jobs
+from db import event_ids, events, jobs
+from db.event_ids import MOST, EventIds
 from db.models import JobRow
 from db.session import Database
 
 After = Annotated[int, Query(ge=0, le=MAX_INT, description="Return only events with a larger number than this.")]
+AfterEvent = Annotated[int, Query(ge=0, le=MOST, description="Return only events after the one with this `id`; 0: all of them.")]
 POLL_SECONDS = 0.3
 PAGE = 500
 LATE = 200
@@ -90,52 +92,59 @@ def _next_page(db: Database, job_id: str, seq: int) -> tuple[list[Event], bool]:
 @project.get("")
 def list_project_events(
     db: Db,
-    after: After = 0,
+    after: AfterEvent = 0,
     limit: Listed = PAGE,
 ) -> ProjectEventList:
     """Returns what happened to all jobs of the project after an event.
 
-    Workers write at the same time, so an event may appear after one with a larger `id`. To miss none, read the stream, or ask again from
-    some hundred before the last `id`; leave out the events that you have seen, by `job` and `seq`.
+    Workers write at the same time, so an event may appear before one that was there already. To miss none, read the stream, which goes
+    back a little.
     """
     with db.read() as session:
-        return ProjectEventList(events=[ProjectEvent.of(row) for row in events.of_all(session, after, limit)])
+        ids = event_ids.of_project(session)
+        found = events.of_all(session, min(ids.meant(after), MAX_INT) if after else 0, limit)
+        return ProjectEventList(events=[ProjectEvent.seen(row, ids) for row in found])
 
 
 @project.get("/stream", response_class=EventSourceResponse)
 async def stream_project_events(
     db: Db,
     request: Request,
-    after: Annotated[int | None, Query(ge=0, le=MAX_INT, description="Begin after this event; by default with what comes next.")] = None,
+    after: Annotated[
+        int | None,
+        Query(ge=0, le=MOST, description="Begin after the event with this `id`; 0: with the first; by default with what comes next."),
+    ] = None,
     last_event_id: Annotated[
-        int | None, Header(ge=0, le=MAX_INT, description="The stream goes on after this event; used instead of `after`.")
+        int | None, Header(ge=0, le=MOST, description="The stream goes on after the event with this `id`; used instead of `after`.")
     ] = None,
 ) -> AsyncIterator[ServerSentEvent]:
     """Streams what happens to all jobs of the project.
 
     It does not end by itself. It goes back a little where it goes on, so an event may come twice, with the same `job` and `seq`. It closes
-    when the caller's key is revoked. A number beyond the last event counts as the last one.
+    when the caller's key is revoked. A number that no event has counts as the last one.
     """
-    begin = after if last_event_id is None else last_event_id
-    last = await run_in_threadpool(_last_id, db)
-    newest = last if begin is None else min(begin, last)
-    seen: set[int] = set() if begin is not None else set(range(max(newest - LATE, 0), newest + 1))
+    given_id = after if last_event_id is None else last_event_id
+    ids, last = await run_in_threadpool(_beginning, db)
+    newest = last if given_id is None else min(ids.meant(given_id) if given_id else 0, last)
+    seen: set[int] = set() if given_id is not None else set(range(max(newest - LATE, 0), newest + 1))
     keyring, given = request.app.state.keyring, presented(request.headers)
     while await keyring.caller(given) is not None:
-        page = await run_in_threadpool(_of_all, db, max(newest - LATE, 0), seen)
-        for event in page:
+        page = await run_in_threadpool(_of_all, db, ids, max(newest - LATE, 0), seen)
+        for _, event in page:
             yield ServerSentEvent(data=event.model_dump(mode="json"), event=event.kind, id=str(event.id))
-        seen.update(event.id for event in page)
-        newest = max([newest, *(event.id for event in page)])
+        seen.update(id for id, _ in page)
+        newest = max([newest, *(id for id, _ in page)])
         seen = {one for one in seen if one > newest - LATE}
         await asyncio.sleep(0 if len(page) == PAGE else POLL_SECONDS)
 
 
-def _of_all(db: Database, after: int, seen: set[int]) -> list[ProjectEvent]:
+def _of_all(db: Database, ids: EventIds, after: int, seen: set[int]) -> list[tuple[int, ProjectEvent]]:
+    """Returns the next events of the project, each with its id in the database."""
     with db.read() as session:
-        return [ProjectEvent.of(row) for row in events.of_all(session, after, PAGE, seen)]
+        return [(row.id, ProjectEvent.seen(row, ids)) for row in events.of_all(session, after, PAGE, seen)]
 
 
-def _last_id(db: Database) -> int:
+def _beginning(db: Database) -> tuple[EventIds, int]:
+    """Returns how the project's people see ids of events, and the last id in the database."""
     with db.read() as session:
-        return events.last_id(session)
+        return event_ids.of_project(session), events.last_id(session)

@@ -14,6 +14,7 @@ from api.schemas.progress import Progress
 from api.schemas.scenes import PairInfo
 from certifier.outcome import Outcome, Stage
 from db import traces
+from db.event_ids import MOST, EventIds
 from db.models import EventRow, JobRow
 from db.states import IterationState, JobState, PairState
 from jobs.fields import Labels, Request
@@ -173,12 +174,13 @@ class Event(BaseModel):
 class ProjectEvent(Event):
     """Describes something that happened to one of the jobs of a project. `job` and `seq` name it; it may come twice."""
 
-    id: int = Field(description="Pass this as `after`, or as Last-Event-ID, to go on after this event.")
+    id: int = Field(ge=0, le=MOST, description="Pass this as `after`, or as Last-Event-ID, to go on after this event. Ids are in no order.")
     job: str = Field(description="Id of the job.")
 
     @classmethod
-    def of(cls, row: EventRow) -> Self:
-        return cls(id=row.id, job=row.job_id, seq=row.seq, kind=row.kind, data=row.data, created_at=row.created_at)
+    def seen(cls, row: EventRow, ids: EventIds) -> Self:
+        """Returns an event as the project's people see it."""
+        return cls(id=ids.shown(row.id), job=row.job_id, seq=row.seq, kind=row.kind, data=row.data, created_at=row.created_at)
 
 
 class ProjectEventList(BaseModel):

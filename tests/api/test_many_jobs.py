@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+from itertools import pairwise
 from typing import Any
 
 import httpx2
@@ -12,7 +13,7 @@ from fastapi.testclient import TestClient
 
 from api.routers.events import LATE
 from certifier.model import Scene
-from db import keys, projects
+from db import events, keys, projects
 from db.keys import Scope
 from db.models import EventRow
 from db.session import Database
@@ -129,6 +130,17 @@ def test_events_of_all_jobs_of_the_project_are_listed(client: TestClient, databa
         key = keys.add(session, "stranger", Scope.ADMIN, "others")
     answer = client.get("/v1/events", headers={"Authorization": f"Bearer {key}"})
     assert answer.json() == {"events": []}
+
+
+def test_ids_of_events_do_not_say_how_many_events_others_have(client: TestClient, database: Database, scene: Scene) -> None:
+    for _ in range(3):
+        labelled(client)
+    seen = [event["id"] for event in client.get("/v1/events").json()["events"]]
+    with database.read() as session:
+        ids = [row.id for row in events.of_all(session, 0, 10)]
+    assert not set(seen) & set(ids)
+    assert {b - a for a, b in pairwise(seen)}.isdisjoint(b - a for a, b in pairwise(ids))
+    assert client.get("/v1/events", params={"after": ids[0]}).json() == {"events": []}, "nobody was shown this number"
 
 
 def test_no_event_is_lost_after_a_job_was_deleted(client: TestClient, database: Database, scene: Scene) -> None:
