@@ -8,6 +8,7 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 
 from api.access import Db
+from api.pages import copies
 from api.pages.job import elapsed
 from api.pages.rendering import page
 from api.parameters import KNOWN_TO_PAGE
@@ -45,6 +46,7 @@ def compare_jobs_page(request: Request, a: str, b: str, db: Db) -> Response:
         "differ": [(name, values) for name, values in known if values[0] != values[1]],
         "alike": sum(values[0] == values[1] for _, values in known),
         "shown": [{"id": job.id, "kind": job.kind} for job in both],
+        "copied": copies.of_two("job", (both[0].id, both[1].id)),
     }
     return page(request, "compare_jobs.html", context)
 
@@ -62,7 +64,7 @@ def compare_scenes_page(request: Request, a: str, b: str, db: Db) -> Response:
     both = [scenes.get_scene(scene, db) for scene in (a, b)]
     first, second = (_described(db, scene.id) for scene in both)
     context = {"both": both, "changes": [(kind, *_changes(first[kind], second[kind])) for kind in first], "listed": LISTED}
-    return page(request, "compare_scenes.html", context)
+    return page(request, "compare_scenes.html", context | {"copied": copies.of_two("scene", (both[0].id, both[1].id))})
 
 
 def _described(db: Database, scene_id: str) -> dict[str, dict[Hashable, Any]]:

@@ -10,6 +10,7 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel
 
 from api.access import Db
+from api.pages import copies
 from api.pages.job import elapsed
 from api.pages.rendering import page
 from api.parameters import KNOWN_TO_PAGE
@@ -46,12 +47,22 @@ class Chosen(BaseModel):
 
 @router.get("/", dependencies=[KNOWN_TO_PAGE])
 def jobs_page(request: Request, db: Db, chosen: Annotated[Chosen, Query()]) -> Response:
-    return page(request, "jobs.html", _home(db, chosen))
+    return page(request, "jobs.html", _home(db, chosen) | {"copied": _copies(chosen)})
 
 
 @router.get("/live", dependencies=[KNOWN_TO_PAGE])
 def jobs_live(request: Request, db: Db, chosen: Annotated[Chosen, Query()]) -> Response:
     return page(request, "jobs_live.html", _home(db, chosen))
+
+
+def _copies(chosen: Chosen) -> copies.Copies:
+    """Describes the list for others, by the names that the interface has for what was chosen."""
+    filters = {name: str(value) for name, value in chosen.model_dump(exclude={"after", "before"}).items() if value}
+    if chosen.state in ENDED:
+        filters["ended"] = str(ENDED[filters.pop("state")]).lower()
+    if re.fullmatch(patterns.LABEL, chosen.search):
+        filters["label"] = filters.pop("search")
+    return copies.of_jobs(filters)
 
 
 def _home(db: Database, chosen: Chosen) -> dict[str, Any]:

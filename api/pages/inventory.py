@@ -8,6 +8,7 @@ from urllib.parse import urlencode
 from fastapi import APIRouter, Request, Response
 
 from api.access import Operator, WholeDb
+from api.pages import copies
 from api.pages.rendering import page
 from api.parameters import KNOWN_TO_PAGE
 from api.probes import Asked, Probes
@@ -17,12 +18,14 @@ from db.session import Database
 
 router = APIRouter()
 
+COPIES = copies.one("ciris project ls", "/v1/inventory", "print(service.client.projects())")
+
 
 @router.get("/inventory", dependencies=[KNOWN_TO_PAGE])
 async def inventory_page(
     request: Request, caller: Operator, db: WholeDb, probes: Asked, sort: Sorted = Order.NAME, after: NameCursor = None
 ) -> Response:
-    return page(request, "inventory.html", await _inventory(caller, db, probes, sort, after))
+    return page(request, "inventory.html", await _inventory(caller, db, probes, sort, after) | {"copied": COPIES})
 
 
 @router.get("/inventory/live", dependencies=[KNOWN_TO_PAGE])

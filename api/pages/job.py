@@ -10,6 +10,7 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 
 from api.access import Db
+from api.pages import copies
 from api.pages.remedies import remedies
 from api.pages.rendering import page
 from api.routers import jobs, regions, scenes, webhooks
@@ -31,7 +32,10 @@ def job_page(request: Request, job_id: str, db: Db) -> Response:
     known = _job(db, job_id)
     with db.read() as session:
         others = [row for row in rows.page(session, scene_id=known["job"].scene).rows if row.id != known["job"].id]
-    return page(request, "job.html", known | {"others": others})
+    given = known["job"].id
+    python = f'job = service.job("{given}")  # job.state, job.reason, job.region_id'
+    copied = copies.one(f"ciris job show {given}", f"/v1/jobs/{given}", python)
+    return page(request, "job.html", known | {"others": others, "copied": copied})
 
 
 @router.get("/jobs/{job_id}/live")

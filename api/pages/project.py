@@ -7,6 +7,7 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 
 from api.access import Db, Reader
+from api.pages import copies
 from api.pages.rendering import page
 from api.parameters import KNOWN_TO_PAGE
 from api.room import KeptRoom, Room
@@ -17,10 +18,12 @@ from db.session import Database
 
 router = APIRouter()
 
+COPIES = copies.one("ciris project show", "/v1/project", "print(service.client.project())")
+
 
 @router.get("/project", dependencies=[KNOWN_TO_PAGE])
 def project_page(request: Request, caller: Reader, db: Db, room: KeptRoom, after: Cursor = None) -> Response:
-    return page(request, "project.html", _project(caller, db, room, after))
+    return page(request, "project.html", _project(caller, db, room, after) | {"copied": COPIES})
 
 
 @router.get("/project/live", dependencies=[KNOWN_TO_PAGE])

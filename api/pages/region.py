@@ -10,6 +10,7 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel
 
 from api.access import Db
+from api.pages import copies
 from api.pages.rendering import page
 from api.parameters import KNOWN_TO_PAGE
 from api.routers import regions, scenes
@@ -59,6 +60,7 @@ def regions_page(request: Request, db: Db, chosen: Annotated[Chosen, Query()]) -
         "guarantees": [*Guarantee],
         "scenes": known,
         "scene_names": {scene.id: scene.name for scene in known},
+        "copied": copies.of_regions(filters),
         "older": urlencode(filters | {"after": found.next}) if found.next else None,
         "newer": urlencode(filters | {"before": found.previous}) if found.previous else None,
     }
@@ -73,7 +75,9 @@ def region_page(request: Request, region_id: str, db: Db) -> Response:
     alone = [_alone(known) for known in ranges]
     others = [other for other in regions.list_regions(db, scene=region.scene).regions if other.id != region.id]
     context = {"region": region, "manifest": region.manifest, "ranges": ranges, "alone": alone, "limits": limits, "others": others}
-    return page(request, "region.html", context)
+    python = f'region = service.region("{region.id}")  # region.C, region.d'
+    copied = copies.one(f"ciris region show {region.id}", f"/v1/regions/{region.id}", python)
+    return page(request, "region.html", context | {"copied": copied})
 
 
 @router.get("/compare", dependencies=[KNOWN_TO_PAGE])
@@ -86,6 +90,7 @@ def compare_page(request: Request, a: str, b: str, db: Db) -> Response:
         "both": both,
         "least": [min((margin for margin in known.values() if margin is not None), default=None) for known in margins],
         "joints": [(name, [known.get(name) for known in joints]) for name in dict.fromkeys([*joints[0], *joints[1]])],
+        "copied": copies.of_two("region", (both[0].id, both[1].id)),
         "pairs": [(pair, [known.get(pair, "not covered") for known in margins]) for pair in dict.fromkeys([*margins[0], *margins[1]])],
     }
     return page(request, "compare.html", context)

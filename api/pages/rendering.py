@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from functools import cache
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,11 @@ from fastapi.templating import Jinja2Templates
 import dashboard
 from api import problems
 from certifier.verify.decimals import at_least_degrees, at_least_mm, at_most_mm, rounded_down
+from db.keys import Scope
 
 ROOT = Path(dashboard.__file__).parent
+DOCS = ROOT.parent / "docs"
+"""A checkout has the documentation; an image has not."""
 _SECURITY = {
     "Content-Security-Policy": "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'; form-action 'self'",
     "X-Content-Type-Options": "nosniff",
@@ -65,7 +69,14 @@ def meaning(word: str) -> str:
     return _MEANINGS.get(word, "")
 
 
+@cache
+def docs() -> list[str]:
+    """Returns the names of the pages of the documentation that are here, such as ``scenes``."""
+    return sorted(path.stem for path in DOCS.glob("*.md"))
+
+
 templates = Jinja2Templates(ROOT / "templates")
+templates.env.globals["docs"] = docs
 templates.env.filters |= {
     "at_least_degrees": at_least_degrees,
     "at_least_mm": at_least_mm,
@@ -81,7 +92,12 @@ templates.env.filters |= {
 
 
 def page(request: Request, name: str, context: dict[str, Any], status: int = 200) -> Response:
-    """Fills in a template of the dashboard. The response's headers forbid the page to load anything from other sites."""
+    """Fills in a template of the dashboard. The response's headers forbid the page to load anything from other sites.
+
+    Templates offer what needs the scope ``submit`` only where ``may_start`` says so.
+    """
+    caller = getattr(request.state, "caller", None)
+    context = context | {"may_start": caller is None or caller.scope.includes(Scope.SUBMIT)}
     return templates.TemplateResponse(request, name, context, status_code=status, headers=_SECURITY)
 
 

@@ -8,6 +8,7 @@ from urllib.parse import urlencode
 from fastapi import APIRouter, Query, Request, Response
 
 from api.access import Db
+from api.pages import copies
 from api.pages.rendering import page
 from api.parameters import KNOWN_TO_PAGE
 from api.routers import regions, scenes
@@ -37,6 +38,7 @@ def scenes_page(request: Request, db: Db, after: Cursor = None, before: Cursor =
         "older": urlencode(wanted | {"after": found.next}) if found.next else None,
         "newer": urlencode(wanted | {"before": found.previous}) if found.previous else None,
         "regions": numbers,
+        "copied": copies.one("ciris scene ls", "/v1/scenes", "print(service.scenes())"),
     }
     return page(request, "scenes.html", context)
 
@@ -58,6 +60,7 @@ def scene_page(request: Request, scene_id: str, db: Db) -> Response:
         "map": mapped,
         "others": [other for other in scenes.list_scenes(db, limit=100).scenes if other.id != scene.id],
         "newest": newest,
+        "copied": copies.one(f"ciris scene show {scene.id}", f"/v1/scenes/{scene.id}", f'scene = service.scene("{scene.id}")'),
         "distance": newest and min((pair["margin"] for pair in newest.manifest["pairs"] if pair["margin"] is not None), default=None),
     }
     return page(request, "scene.html", context)

@@ -8,6 +8,7 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 
 from api.access import Db, Reader
+from api.pages import copies
 from api.pages.rendering import page
 from api.parameters import KNOWN_TO_PAGE
 from api.routers import workers
@@ -17,10 +18,12 @@ from db.states import WorkerState
 
 router = APIRouter()
 
+COPIES = copies.one("ciris worker ls", "/v1/workers", "print(service.client.workers())")
+
 
 @router.get("/workers", dependencies=[KNOWN_TO_PAGE])
 def workers_page(request: Request, caller: Reader, db: Db, after: Cursor = None) -> Response:
-    return page(request, "workers.html", _crew(caller, db, after))
+    return page(request, "workers.html", _crew(caller, db, after) | {"copied": COPIES})
 
 
 @router.get("/workers/live", dependencies=[KNOWN_TO_PAGE])

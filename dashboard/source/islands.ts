@@ -4,6 +4,7 @@ import type { ComponentType } from "preact";
 const ISLANDS: Record<string, () => Promise<ComponentType<any>>> = {
   "compare-jobs": async () => (await import("./compare/jobs")).CompareJobsIsland,
   "compare-regions": async () => (await import("./compare/regions")).CompareRegionsIsland,
+  copies: async () => (await import("./common/copies")).CopiesIsland,
   job: async () => (await import("./job/job")).JobIsland,
   library: async () => (await import("./library/library")).LibraryIsland,
   new: async () => (await import("./new/new")).NewIsland,

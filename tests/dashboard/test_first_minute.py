@@ -61,6 +61,7 @@ def test_a_urdf_is_taken_as_it_is(page: Any, url: str, client: TestClient) -> No
     page.get_by_label("or upload one").set_input_files(ARM)
     page.get_by_text("arm is stored, with 3 joints").wait_for()
     page.locator(".slider").nth(2).wait_for()
+    assert page.get_by_text("What this is for").count() == 0, "the robot is there to be looked at"
     (scene,) = client.get("/v1/scenes").json()["scenes"]
     assert (scene["name"], scene["joints"]) == ("arm", 3)
 

@@ -16,6 +16,7 @@ from db.session import Database
 from db.states import JobState
 from db.types import utcnow
 from tests.dashboard.job_scenes import begin, certified, large_job, new_job, settle, too_close
+from tests.dashboard.test_region_page import OBSERVE
 from tests.scenes import slider
 
 DESK = {"viewport": {"width": 1280, "height": 800}}
@@ -32,6 +33,12 @@ window.watched = () => {
     return found;
 };
 """
+MARKED = """() => {
+    const found = [];
+    inView.traverse((one) => { if (one.isMesh && one.visible && !one.material.depthTest) found.push(one.position.toArray()); });
+    return found;
+}"""
+"""The places in the world that are seen through all that is before them."""
 
 
 @pytest.fixture
@@ -61,6 +68,23 @@ def orange(browser: Any, png: bytes) -> int:
     )
     page.close()
     return count
+
+
+def middle(browser: Any, png: bytes) -> str:
+    """The colour in the middle of a picture, as #rrggbb."""
+    page = browser.new_page()
+    colour: str = page.evaluate(
+        """async (data) => {
+            const image = await createImageBitmap(await (await fetch('data:image/png;base64,' + data)).blob());
+            const pen = new OffscreenCanvas(image.width, image.height).getContext('2d');
+            pen.drawImage(image, 0, 0);
+            const found = pen.getImageData(image.width / 2, image.height / 2, 1, 1).data;
+            return '#' + [...found].slice(0, 3).map((value) => value.toString(16).padStart(2, '0')).join('');
+        }""",
+        base64.b64encode(png).decode(),
+    )
+    page.close()
+    return colour
 
 
 def finish(database: Database, job_id: str) -> None:
@@ -200,13 +224,19 @@ def test_the_cells_of_a_drawing_are_those_that_are_open_and_proved(page: Any, ur
 
 
 def test_what_holds_the_region_back_is_said_and_drawn(page: Any, url: str, job_id: str) -> None:
+    page.add_init_script(OBSERVE)
     page.goto(f"{url}/jobs/{job_id}")
     page.get_by_text("model/cart/ball and world/post0 come too close: 0.001 m apart, as floating point says.").wait_for()
     page.get_by_text("world/post0 are painted").scroll_into_view_if_needed()
     robot = page.get_by_role("img", name=re.compile(r"^The robot at slide 0\.400 m"))
     robot.wait_for()
     page.wait_for_timeout(300)
-    assert orange(page.context.browser, robot.screenshot()) > 500, "the two bodies are painted"
+    picture = robot.screenshot()
+    assert orange(page.context.browser, picture) > 500, "the two bodies are painted"
+    (place,) = page.evaluate(MARKED)
+    assert place == pytest.approx([0.2, 0.25, 0], abs=1e-6), "midway between the cart and the post"
+    ink = page.evaluate("getComputedStyle(document.documentElement).getPropertyValue('--ink')").strip()
+    assert middle(page.context.browser, picture) == ink, "the place is marked, and in the middle of the view"
     page.get_by_role("link", name="Open the pair").click()
     page.get_by_role("heading", name="world/post0").wait_for()
 

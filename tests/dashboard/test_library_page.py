@@ -227,7 +227,7 @@ def test_a_link_is_dragged_and_the_rest_of_the_view_turns(page: Any, url: str, p
     assert shown(page) == there, "no link is there"
 
 
-def test_bodies_are_hidden_and_named_from_a_tree_and_the_view_stands_elsewhere(opened: Any, planar: Scene) -> None:
+def test_bodies_are_hidden_faded_and_named_from_a_tree_and_the_view_stands_elsewhere(opened: Any, planar: Scene) -> None:
     canvas = opened.locator(".robot canvas")
 
     def looks(*, after: str) -> bytes:
@@ -246,18 +246,22 @@ def test_bodies_are_hidden_and_named_from_a_tree_and_the_view_stands_elsewhere(o
     opened.locator(".view-tools summary").click()
     tree = opened.locator(".view-tools details")
     assert {name.strip() for name in tree.locator("label").all_text_contents()} == {*planar.bodies}
-    nested = tree.locator("li", has=opened.get_by_label("arm/link1")).locator("li").get_by_label("arm/link2")
+    nested = tree.locator("li", has=opened.get_by_label("arm/link1", exact=True)).locator("li").get_by_label("arm/link2", exact=True)
     assert nested.count() == 1, "the second link hangs on the first"
-    tree.get_by_label("arm/link2").focus()
+    tree.get_by_label("arm/link2", exact=True).focus()
     looks(after="pointing at a body")
-    tree.get_by_label("arm/link2").uncheck()
+    fade = tree.get_by_role("button", name="Fade arm/link2")
+    fade.click()
+    looks(after="fading it")
+    assert fade.get_attribute("aria-pressed") == "true"
+    tree.get_by_label("arm/link2", exact=True).uncheck()
     looks(after="hiding it")
     opened.get_by_text("bodies, 1 hidden").wait_for()
     before = shown(opened)
     opened.get_by_role("button", name="View: fit").click()
     looks(after="fit")
     assert shown(opened) == before
-    tree.get_by_label("arm/link2").check()
+    tree.get_by_label("arm/link2", exact=True).check()
     looks(after="showing it again")
 
 

@@ -70,7 +70,7 @@ def test_a_mesh_moves_and_hides_with_its_body(arm: Any) -> None:
     arm.locator(".slider input[type=range]").first.press("End")
     until(lambda: arm.evaluate(f"{place} return found.matrix.elements; }}") != before)
     arm.locator(".view-tools summary").click()
-    arm.get_by_label("arm/tip").uncheck()
+    arm.get_by_label("arm/tip", exact=True).uncheck()
     drawn(arm, 0)
 
 

@@ -117,7 +117,7 @@ def test_what_touches_is_said_live_and_no_job_starts_there(opened: Any, client: 
 
 def test_the_address_keeps_the_configuration(opened: Any) -> None:
     set_joint(opened, "arm/joint1", 10)
-    opened.wait_for_function("location.search.includes('q=0.1745,-0.2')")
+    opened.wait_for_url("**q=0.1745,-0.2")
     opened.reload()
     opened.get_by_text("No collision (computed").wait_for()
     assert opened.get_by_role("spinbutton", name="arm/joint1, degrees, as a number").input_value() == "10.0"
@@ -220,10 +220,10 @@ def test_a_map_is_asked_for(opened: Any, url: str, client: TestClient) -> None:
 
 def copied(page: Any, form: str) -> str:
     """The job of the form as a command, as curl, or in Python."""
-    if page.locator("#copies[open]").count() == 0:
-        page.locator("#copies summary").click()
+    if page.locator(".copies[open]").count() == 0:
+        page.locator(".copies summary").click()
     page.get_by_role("button", name=form, exact=True).click()
-    return str(page.locator("#copies pre").inner_text())
+    return str(page.locator(".copies pre").inner_text())
 
 
 def fill_in(page: Any, kind: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -18,10 +19,11 @@ from certifier.jobs.region import Region
 from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.verify.decimals import at_least_mm
-from db import jobs, pairs, regions, scenes, steps
+from db import jobs, leases, pairs, regions, scenes, steps, workers
 from db.pairs import NewPair
 from db.session import Database
-from db.states import IterationState, JobState, PairState, StepState
+from db.states import IterationState, JobState, PairState, StepState, WorkerState
+from db.workers import Made, WorkerKind
 from tests.api.test_planning import store_map
 from tests.db.builders import add_iteration
 from tests.db.builders import certified as certified_pair
@@ -252,6 +254,34 @@ def test_lists_pages_and_the_api_say_what_a_job_does(client: TestClient, running
         text = client.get(path).text
         assert '<span class="badge queued">queued: no worker</span>' in text
         assert ">running</span>" not in text
+
+
+def test_an_iteration_is_said_to_go_on_only_where_somebody_works(client: TestClient, running: str, database: Database) -> None:
+    with database.write() as session:
+        job = jobs.lock(session, running)
+        new = [NewPair(0, "a", "b", 1.0)]
+        add_iteration(session, job, index=0, label="cells", C=[[1.0]], d=[1.0], center=[0.0], pairs=new)
+
+    def head() -> str:
+        return client.get(f"/jobs/{running}").text.partition('id="h-progress">')[2].partition("</h2>")[0]
+
+    assert head().strip() == "Iteration 0: cell by cell"
+    with database.write() as session:
+        workers.tell(session, Made(leases.name_of(os.getppid()), WorkerKind.SOLVE, "1.2", 4, 8, 2**34), WorkerState.RUNNING)
+        assert pairs.claim(session, jobs.lock(session, running), lease_seconds=60, batch_seconds=0.5) is not None
+    assert "since <time" in head()
+
+
+def test_the_documentation_is_a_link_away(client: TestClient) -> None:
+    assert '<a href="/docs/dashboard">Help</a>' in client.get("/workers").text
+    assert '<a href="/docs/quickstart">how to begin</a>' in client.get("/new").text
+    text = client.get("/docs/scenes").text
+    assert "<h1>" in text
+    assert re.search(r'<a href="/docs/\w+">[^<]+</a>', text.partition("<article")[2])
+    for name in re.findall(r'href="/docs/(\w+)"', text):
+        assert client.get(f"/docs/{name}").status_code == 200, name
+    for name in ("nothing", "..%2FREADME", "scenes.md"):
+        assert client.get(f"/docs/{name}", headers={"Accept": "text/html"}).status_code == 404, name
 
 
 @pytest.mark.parametrize("path", ["/", "/live", "/scenes", "/workers", "/workers/live", "/project", "/project/live", "/compare"])

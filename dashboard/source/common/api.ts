@@ -1,6 +1,11 @@
 // Asks the service. Every answer that is no success becomes a ServiceError that says what, where and what to do.
 import type { Event, EventList, Job } from "./schema";
 
+/** Whether the service asks for keys. */
+export const KEYED = document.body.dataset.keyed !== undefined;
+/** Whether whoever reads the page may add scenes and start jobs. What somebody may not do is not offered. */
+export const MAY_START = document.body.dataset.scope !== "read";
+
 export class ServiceError extends Error {
   constructor(
     readonly status: number,

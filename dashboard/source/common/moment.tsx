@@ -73,9 +73,9 @@ export function useMoment(scene: string, q: number[]): Moment {
   return known.key === key ? known.moment : NOTHING;
 }
 
-/** The geometries that touch, by index. */
-export function touchingOf(model: SceneModel, moment: Moment): number[] {
-  return [...new Set((moment.pairs ?? []).flatMap((pair) => model.pairs[pair] ?? []))];
+/** The pairs of geometries that touch, by index. */
+export function touchingOf(model: SceneModel, moment: Moment): number[][] {
+  return (moment.pairs ?? []).flatMap((pair) => (model.pairs[pair] ? [model.pairs[pair]] : []));
 }
 
 /** Says in words what is known of the configuration, and how surely. */

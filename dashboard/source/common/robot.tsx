@@ -3,15 +3,17 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { get, said } from "./api";
 import type { SceneMeshes, SceneModel } from "./schema";
 import type { PlaneDrawn } from "./square";
-import { View } from "./view";
+import { haveBodies, View } from "./view";
 
 interface Props {
   model: SceneModel;
   q: number[];
   /** Says in words what is to be seen, for those who do not see it. */
   label: string;
-  /** Indices of geometries that are painted as touching. */
-  touching?: number[];
+  /** Pairs of geometries, by index, that touch: they are painted, and the place is marked. */
+  touching?: number[][];
+  /** Whether the view looks at the first contact, wherever it is. */
+  framed?: boolean;
   /** Configurations at which the links are drawn faintly as well. Give the same array again as long as it does not change. */
   ghosts?: number[][];
   /** A plane between two geometries. Give the same object again as long as it does not change. */
@@ -22,7 +24,7 @@ interface Props {
 
 const NONE: number[][] = [];
 
-export function Robot({ model, q, label, touching = [], ghosts = NONE, plane = null, onDrag }: Props) {
+export function Robot({ model, q, label, touching = NONE, framed = false, ghosts = NONE, plane = null, onDrag }: Props) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const view = useRef<View | null>(null);
   const [failed, setFailed] = useState(false);
@@ -39,7 +41,10 @@ export function Robot({ model, q, label, touching = [], ghosts = NONE, plane = n
     };
   }, [model]);
   useEffect(() => view.current?.setPose(q), [model, q.join()]);
-  useEffect(() => view.current?.colour(touching), [model, touching.join()]);
+  useEffect(() => view.current?.colour(touching), [model, JSON.stringify(touching)]);
+  useEffect(() => {
+    if (framed) view.current?.frameContact();
+  }, [model, framed, JSON.stringify(touching), q.join()]);
   useEffect(() => view.current?.setGhosts(ghosts), [model, ghosts]);
   useEffect(() => view.current?.setPlane(plane), [model, plane]);
   useEffect(() => {
@@ -51,7 +56,7 @@ export function Robot({ model, q, label, touching = [], ghosts = NONE, plane = n
   };
   return (
     <figure class="robot">
-      {!failed && <Tools model={model} view={view} />}
+      {!failed && <Tools model={model} view={view} contact={touching.some((pair) => haveBodies(model, pair))} />}
       {failed ? (
         <p class="empty">This browser cannot draw the robot, because WebGL is off.</p>
       ) : (
@@ -62,23 +67,30 @@ export function Robot({ model, q, label, touching = [], ghosts = NONE, plane = n
 }
 
 /** What else the view can do: stand elsewhere, show frames and the models' own meshes, and leave bodies out. */
-function Tools({ model, view }: { model: SceneModel; view: { current: View | null } }) {
+function Tools({ model, view, contact }: { model: SceneModel; view: { current: View | null }; contact: boolean }) {
   const [frames, setFrames] = useState(false);
   const [hidden, setHidden] = useState<Set<string>>(new Set());
   useEffect(() => view.current?.setFrames(frames), [model, frames]);
+  const [faded, setFaded] = useState<Set<string>>(new Set());
   useEffect(() => view.current?.setHidden(hidden), [model, hidden]);
-  const show = (body: string, on: boolean): void => setHidden(new Set([...hidden].filter((other) => other !== body).concat(on ? [] : body)));
+  useEffect(() => view.current?.setFaded(faded), [model, faded]);
   return (
     <div class="view-tools">
       {(["front", "top", "fit"] as const).map((from) => <button type="button" key={from} aria-label={`View: ${from}`} onClick={() => view.current?.look(from)}>{from}</button>)}
+      {contact && <button type="button" aria-label="View: contact" onClick={() => view.current?.frameContact()}>contact</button>}
       <label><input type="checkbox" checked={frames} onChange={(event) => setFrames(event.currentTarget.checked)} /> frames</label>
       <details>
         <summary>bodies{hidden.size > 0 && `, ${hidden.size} hidden`}</summary>
-        <Bodies bodies={roots(model)} model={model} hidden={hidden} onShow={show} onPoint={(body) => view.current?.point(body)} />
+        <Bodies bodies={roots(model)} model={model} hidden={hidden} faded={faded} onShow={(body, on) => setHidden(changed(hidden, body, !on))} onFade={(body, on) => setFaded(changed(faded, body, on))} onPoint={(body) => view.current?.point(body)} />
       </details>
       {model.has_meshes && <Shown key={model.scene} model={model} view={view} />}
     </div>
   );
+}
+
+/** The set with or without a body. */
+function changed(bodies: Set<string>, body: string, with_: boolean): Set<string> {
+  return new Set([...[...bodies].filter((other) => other !== body), ...(with_ ? [body] : [])]);
 }
 
 /** Switches the certified bodies, and the meshes that they stand for. The meshes are fetched when somebody wants them. */
@@ -119,13 +131,15 @@ interface Listed {
   bodies: string[];
   model: SceneModel;
   hidden: Set<string>;
+  faded: Set<string>;
   onShow: (body: string, on: boolean) => void;
+  onFade: (body: string, on: boolean) => void;
   onPoint: (body: string | null) => void;
 }
 
 /** The tree of bodies, each below the one that carries it. */
 function Bodies({ bodies, ...rest }: Listed) {
-  const { model, hidden, onShow, onPoint } = rest;
+  const { model, hidden, faded, onShow, onFade, onPoint } = rest;
   return (
     <ul>
       {bodies.map((body) => {
@@ -134,7 +148,8 @@ function Bodies({ bodies, ...rest }: Listed) {
           <li key={body}>
             <label onPointerEnter={() => onPoint(body)} onPointerLeave={() => onPoint(null)} onFocusIn={() => onPoint(body)} onFocusOut={() => onPoint(null)}>
               <input type="checkbox" checked={!hidden.has(body)} onChange={(event) => onShow(body, event.currentTarget.checked)} /> {body}
-            </label>
+            </label>{" "}
+            <button type="button" class="plain" aria-pressed={faded.has(body)} aria-label={`Fade ${body}`} onClick={() => onFade(body, !faded.has(body))}>fade</button>
             {children.length > 0 && <Bodies {...rest} bodies={children} />}
           </li>
         );

@@ -1,5 +1,6 @@
 // A slice through configuration space: two joints move, the others stay. It shows what collides, what is free, and the regions over it.
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { inAddress, useAddress } from "./address";
 import { post, said } from "./api";
 import { EMPTY, leavesInSlice, OPEN } from "./cells";
 import { onScheme, token } from "./colours";
@@ -35,8 +36,9 @@ const PAD = { left: 52, right: 10, top: 10, bottom: 34 };
 
 /** A slice with the choice of its joints. */
 export function Slice(props: Props) {
-  const [axes, setAxes] = useState<Axes>([0, 1]);
   const { joints } = props.space;
+  const [axes, setAxes] = useState(() => axesIn(joints, inAddress("across"), inAddress("up")));
+  useAddress({ across: axes[0] === 0 && axes[1] === 1 ? null : joints[axes[0]]!, up: axes[0] === 0 && axes[1] === 1 ? null : joints[axes[1]]! });
   if (joints.length < 2) return <p class="empty">A slice needs two joints; this scene has one.</p>;
   return (
     <div class="slice">
@@ -44,6 +46,12 @@ export function Slice(props: Props) {
       <SliceOf {...props} axes={axes} />
     </div>
   );
+}
+
+/** The places of two joints by their names; the first two where these are not two of the joints. */
+export function axesIn(joints: string[], across: string | null, up: string | null): Axes {
+  const places = [across, up].map((name) => joints.indexOf(name ?? "")) as Axes;
+  return places.includes(-1) || places[0] === places[1] ? [0, 1] : places;
 }
 
 /** Two different ones of at least two joints. */

@@ -1,7 +1,7 @@
 // One slider for each joint, with a field for the number: angles where the joint turns, metres where it slides.
 import { useRef, useState } from "preact/hooks";
 import { shortNames } from "./kinematics";
-import { SHOWN, shown } from "./units";
+import { bare, SHOWN, shown } from "./units";
 
 interface Props {
   names: string[];
@@ -44,7 +44,7 @@ export function Sliders({ names, units, lower, upper, q, onChange, allowed, mark
   return (
     <div class="sliders">
       {names.map((name, i) => {
-        const { scale, digits, sign, word: unit } = SHOWN[units[i]!];
+        const { scale, sign, word: unit } = SHOWN[units[i]!];
         const limits = { min: lower[i]! / scale, max: upper[i]! / scale, step: "any" };
         return (
           <div class={marked.includes(i) ? "slider marked" : "slider"} key={name} title={allowed && inWords(i)}>
@@ -53,7 +53,7 @@ export function Sliders({ names, units, lower, upper, q, onChange, allowed, mark
               {allowed && <span class="allowed" aria-hidden="true" style={band(allowed[i]!, lower[i]!, upper[i]!)} />}
               <input type="range" {...limits} value={q[i]! / scale} aria-label={`${name}, ${unit}`} onInput={(event) => set(i, event.currentTarget.value)} />
             </span>
-            <NumberField range={limits} text={(q[i]! / scale).toFixed(digits)} label={`${name}, ${unit}, as a number`} onEnter={(text) => enter(i, text)} />
+            <NumberField range={limits} text={bare(q[i]!, units[i]!)} label={`${name}, ${unit}, as a number`} onEnter={(text) => enter(i, text)} />
             <span class="unit" aria-hidden="true">{sign.trim()}</span>
           </div>
         );

@@ -31,8 +31,9 @@ export function inWords(units: Unit[]): string {
   return [...new Set(units.map((unit) => SHOWN[unit].word))].sort().join(" and ");
 }
 
-function bare(value: number, unit: Unit): string {
-  return (value / SHOWN[unit].scale).toFixed(SHOWN[unit].digits);
+/** A position without its unit. What rounds to zero has no sign. */
+export function bare(value: number, unit: Unit): string {
+  return (value / SHOWN[unit].scale).toFixed(SHOWN[unit].digits).replace(/^-(?=[0.]*$)/, "");
 }
 
 /** The address with the choice, if it is not the usual one. */

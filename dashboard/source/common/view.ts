@@ -9,12 +9,15 @@ import { toMatrix4 } from "./matrix";
 import { Limits } from "./limits";
 import { pulled } from "./pull";
 import { Meshes } from "./meshes";
+import { between } from "./nearest";
 import type { DrawnGeometry, SceneMeshes, SceneModel } from "./schema";
 import { Square, type PlaneDrawn } from "./square";
 
 const GHOST_OPACITY = 0.1;
 const AROUND_OPACITY = 0.3; // of certified bodies with meshes in them
 const MOST_GHOSTS = 300;
+const FADED_OPACITY = 0.18;
+const MOST_MARKS = 4; // of contacts
 const TURN = 0.12; // radians a key press
 const ZOOM = 1.15;
 
@@ -49,6 +52,11 @@ function shapeOf({ vertices: rows, triangles, radius }: DrawnGeometry): three.Bu
   return shape;
 }
 
+/** Whether a pair is one of bodies. What stands for a condition has none. */
+export function haveBodies(model: SceneModel, pair: number[]): boolean {
+  return pair.length === 2 && pair.every((i) => model.geometries[i]!.vertices.length > 0);
+}
+
 interface Drawn {
   geometry: DrawnGeometry;
   mesh: three.Mesh<three.BufferGeometry, three.MeshStandardMaterial>;
@@ -72,8 +80,10 @@ export class View {
   private ghosts: three.InstancedMesh[] = [];
   private home = { position: new three.Vector3(), target: new three.Vector3() };
   private asked = 0;
-  private touching: number[] = [];
+  private touching: number[][] = [];
+  private readonly marks: three.Mesh<three.SphereGeometry, three.MeshBasicMaterial>[] = [];
   private hidden = new Set<string>();
+  private faded = new Set<string>();
   /** The body that somebody points at, in the list of bodies. */
   private pointed: string | null = null;
   private axes: Map<string, three.AxesHelper> | null = null;
@@ -145,16 +155,39 @@ export class View {
     const box = new three.Box3();
     for (const { geometry, mesh } of this.drawn) if (!this.hidden.has(geometry.body)) box.expandByObject(mesh);
     if (box.isEmpty()) return;
-    const sphere = box.getBoundingSphere(new three.Sphere());
-    const direction = DIRECTIONS[from] ? new three.Vector3(...DIRECTIONS[from]) : this.camera.position.clone().sub(this.controls.target);
+    this.see(box.getBoundingSphere(new three.Sphere()), DIRECTIONS[from] ? new three.Vector3(...DIRECTIONS[from]) : this.line());
+  }
+
+  /** Looks at the first contact, from where the view looks, so near that the smaller of the two bodies is seen whole. */
+  frameContact(): void {
+    const mark = this.marks[0];
+    if (!mark?.visible) return;
+    const first = this.touching.find((pair) => haveBodies(this.model, pair))!;
+    const radii = first.map((i) => new three.Box3().setFromObject(this.drawn[i]!.mesh).getBoundingSphere(new three.Sphere()).radius);
+    this.see(new three.Sphere(mark.position.clone(), Math.min(...radii, this.reach) + 0.4 * this.reach), this.line());
+  }
+
+  /** From what the view looks at to the camera. */
+  private line(): three.Vector3 {
+    return this.camera.position.clone().sub(this.controls.target);
+  }
+
+  /** Has a ball fill the view, seen from a direction. */
+  private see({ center, radius }: three.Sphere, direction: three.Vector3): void {
     const half = (this.camera.fov * Math.PI) / 360;
-    const distance = sphere.radius / Math.sin(Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect)));
-    this.controls.target.copy(sphere.center);
-    this.camera.position.copy(sphere.center).addScaledVector(direction.normalize(), distance);
+    const distance = radius / Math.sin(Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect)));
+    this.controls.target.copy(center);
+    this.camera.position.copy(center).addScaledVector(direction.normalize(), distance);
     this.camera.far = Math.max(this.camera.far, 4 * distance);
     this.camera.updateProjectionMatrix();
     this.controls.update();
     this.draw();
+  }
+
+  /** Lets these bodies be seen through. */
+  setFaded(bodies: Set<string>): void {
+    this.faded = bodies;
+    this.show();
   }
 
   /** Leaves the geometries of these bodies out. */
@@ -169,19 +202,20 @@ export class View {
     this.certified = certified;
     this.meshes?.dispose();
     this.meshes = meshes && new Meshes(this.scene, meshes);
-    this.meshes?.colour(token("--quiet"));
-    for (const { mesh } of this.drawn) {
-      mesh.material.transparent = meshes !== null;
-      mesh.material.opacity = meshes ? AROUND_OPACITY : 1;
-      mesh.material.depthWrite = meshes === null;
-      mesh.material.needsUpdate = true;
-    }
+    this.meshes?.colour(token("--rest"));
     this.show();
     this.setPose(this.q);
   }
 
   private show(): void {
-    for (const { geometry, mesh } of this.drawn) mesh.visible = this.certified && !this.hidden.has(geometry.body);
+    for (const { geometry, mesh } of this.drawn) {
+      const opacity = this.faded.has(geometry.body) ? FADED_OPACITY : this.meshes ? AROUND_OPACITY : 1;
+      mesh.visible = this.certified && !this.hidden.has(geometry.body);
+      mesh.material.transparent = opacity < 1;
+      mesh.material.opacity = opacity;
+      mesh.material.depthWrite = opacity === 1;
+      mesh.material.needsUpdate = true;
+    }
     this.meshes?.hide(this.hidden);
     this.draw();
   }
@@ -292,22 +326,46 @@ export class View {
     this.limits?.setPose(found);
     this.meshes?.setPose(found);
     this.square?.setPose(found);
+    this.mark();
     this.draw();
   }
 
-  /** Paints these geometries, by index, as what touches; all others have their own colour. */
-  colour(touching: number[]): void {
+  /** Marks where bodies touch, or are nearest to each other, through all that is before it. */
+  private mark(): void {
+    const shown = this.touching.filter((pair) => haveBodies(this.model, pair)).slice(0, MOST_MARKS);
+    while (this.marks.length < shown.length) {
+      const mark = new three.Mesh(new three.SphereGeometry(0.02 * this.reach, 16, 12), new three.MeshBasicMaterial({ depthTest: false, transparent: true }));
+      mark.renderOrder = 2;
+      this.marks.push(mark);
+      this.scene.add(mark);
+    }
+    this.marks.forEach((mark, k) => {
+      const pair = shown[k];
+      mark.visible = pair !== undefined;
+      mark.material.color.set(token("--ink"));
+      if (!pair) return;
+      const [a, b] = pair.map((i) => {
+        const { geometry, mesh } = this.drawn[i]!;
+        return { vertices: toVectors(geometry.vertices).map((vertex) => vertex.applyMatrix4(mesh.matrix)), radius: geometry.radius };
+      });
+      mark.position.copy(between(a!, b!));
+    });
+  }
+
+  /** Paints the geometries of these pairs, by index, as what touches, and marks where; all others have their own colour. */
+  colour(touching: number[][]): void {
     this.touching = touching;
-    const are = new Set(touching);
+    const are = new Set(touching.flat());
     this.drawn.forEach(({ geometry, mesh, colour }, i) => {
       const lit = are.has(i) ? CONTACT : this.pair.includes(i) ? PROVED : geometry.body === this.pointed ? token("--ink") : null;
       mesh.material.color.set(are.has(i) ? CONTACT : (colour ?? token("--rest")));
       mesh.material.emissive.set(lit ?? "#000000");
       mesh.material.emissiveIntensity = lit ? 0.35 : 0;
     });
-    this.meshes?.colour(token("--quiet"));
-    const names = touching.map((i) => this.model.geometries[i]!.name).filter(ofCondition);
+    this.meshes?.colour(token("--rest"));
+    const names = touching.flat().map((i) => this.model.geometries[i]!.name).filter(ofCondition);
     this.limits?.colour(new Set(names.map((name) => name.split("/")[1]!)), token("--good"), CONTACT);
+    this.mark();
     this.draw();
   }
 
@@ -361,7 +419,7 @@ export class View {
     this.limits?.dispose();
     this.square?.dispose();
     this.meshes?.dispose();
-    for (const { mesh } of this.drawn) {
+    for (const mesh of [...this.drawn.map(({ mesh }) => mesh), ...this.marks]) {
       mesh.geometry.dispose();
       mesh.material.dispose();
     }

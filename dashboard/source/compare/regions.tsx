@@ -3,7 +3,7 @@ import { useEffect, useMemo, useState } from "preact/hooks";
 import { get, said } from "../common/api";
 import type { Space } from "../common/polytope";
 import type { RegionConfigurations, RegionDetail } from "../common/schema";
-import { AxesChoice, SliceOf } from "../common/slice";
+import { axesIn, AxesChoice, SliceOf } from "../common/slice";
 
 interface Compared {
   id: string;
@@ -33,7 +33,14 @@ function Slices({ both }: { both: Compared[] }) {
   const [first, second] = both as [Compared, Compared];
   const joints = useMemo(() => first.space.joints.filter((name) => second.space.joints.includes(name)), [both]);
   const alike = first.space.joints.join() === second.space.joints.join();
-  const [axes, setAxes] = useState<[number, number]>([0, 1]);
+  const [axes, setAxes] = useState(() => {
+    const given = new URLSearchParams(location.hash.slice(1));
+    return axesIn(joints, given.get("across"), given.get("up"));
+  });
+  const choose = (next: [number, number]): void => {
+    setAxes(next);
+    location.replace(`#${new URLSearchParams({ across: joints[next[0]]!, up: joints[next[1]]! })}`);
+  };
   const [at, setAt] = useState(both.map(({ seed }) => seed));
   const through = (of: string): void => setAt(both.map(({ seed }) => both.find(({ id }) => id === of)?.seed ?? seed));
   /** Both points move along the joints of the slice. */
@@ -46,7 +53,7 @@ function Slices({ both }: { both: Compared[] }) {
     <section aria-labelledby="h-slices" class="slice">
       <h2 id="h-slices">Slices</h2>
       <div class="axes">
-        <AxesChoice joints={joints} axes={axes} onChange={setAxes} />
+        <AxesChoice joints={joints} axes={axes} onChange={choose} />
         {alike && (
           <label>
             through{" "}

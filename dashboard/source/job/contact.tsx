@@ -40,7 +40,7 @@ export function Contact({ pair, a, b, q, robot: { model, problem } }: Props) {
       {problem ? (
         <p class="notice bad">The robot cannot be drawn. {problem}</p>
       ) : seen && model ? (
-        <Robot model={model} q={q} touching={pair === null ? [] : model.pairs[pair]!} label={`The robot at ${where}. ${words}`} />
+        <Robot model={model} q={q} touching={pair === null ? [] : [model.pairs[pair]!]} framed label={`The robot at ${where}. ${words}`} />
       ) : (
         <Waiting>Loading the robot …</Waiting>
       )}

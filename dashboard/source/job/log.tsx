@@ -1,5 +1,6 @@
 // What has happened to the job, in sentences, the newest first.
 import { useState } from "preact/hooks";
+import { inAddress, useAddress } from "../common/address";
 import type { Event } from "../common/schema";
 import { duration, plural } from "./outcomes";
 import { stageOf, stepOf } from "./steps";
@@ -13,7 +14,7 @@ const ITERATION: Record<string, string> = {
 };
 const IS: Record<string, string> = {
   queued: "waits for a worker",
-  running: "is running",
+  running: "has begun",
   cancelling: "is being cancelled",
   cancelled: "was cancelled",
   succeeded: "has succeeded",
@@ -85,7 +86,8 @@ function sentence({ kind, data }: Event, subject: string): string {
 }
 
 export function Log({ store, subject }: { store: JobStore; subject: string }) {
-  const [kind, setKind] = useState("");
+  const [kind, setKind] = useState(inAddress("events") ?? "");
+  useAddress({ events: kind || null });
   const known = store.events.filter((event) => !kind || event.kind === kind).reverse();
   const earlier = (store.events[0]?.seq ?? 1) > 1;
   // A map has no regions, and a region no cover. Of events that are not here yet, nobody knows the kinds.

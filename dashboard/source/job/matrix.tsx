@@ -3,6 +3,7 @@
 import { Component } from "preact";
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
 import type { IterationStates, PairInfo } from "../common/schema";
+import { inAddress, useAddress } from "../common/address";
 import { address, go } from "./route";
 import { CERTIFIED, OUTCOMES, atLeast, badness, duration, facts, plural } from "./outcomes";
 import { stageOf } from "./steps";
@@ -27,9 +28,9 @@ interface Place {
 
 /** What the reader has chosen and where he was, kept while a pair is open instead of the matrix. */
 export class Memory {
-  outcome = "";
-  order: Order = "scene";
-  search = "";
+  outcome = inAddress("show") ?? "";
+  order = (inAddress("sort") ?? "scene") as Order;
+  search = inAddress("name") ?? "";
   active: Place = { row: 0, column: 0 };
   top = 0;
   left = 0;
@@ -46,6 +47,7 @@ export function Matrix({ store, version, memory }: { store: JobStore; version: n
   const [order, setOrder] = useState(memory.order);
   const [search, setSearch] = useState(memory.search);
   Object.assign(memory, { outcome, order, search });
+  useAddress({ show: outcome || null, sort: order === "scene" ? null : order, name: search || null });
   const rows = useMemo(() => chosen(store, outcome, order, search), [version, outcome, order, search]);
   return (
     <section aria-labelledby="h-pairs">

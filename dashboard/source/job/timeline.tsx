@@ -1,6 +1,7 @@
 // What each process did for the job over time, how fast the work went, and how long the iteration will last. The server tells many pieces
 // of work together, and one by one where the reader comes closer.
 import { useEffect, useRef, useState } from "preact/hooks";
+import { inAddress, useAddress } from "../common/address";
 import { get, said } from "../common/api";
 import type { Bar, Timeline as Told } from "../common/schema";
 import { duration, plural } from "./outcomes";
@@ -22,6 +23,12 @@ const DRAG = 0.01;
 
 /** Seconds since the job's start; null for the whole time. */
 type Range = { since: number; until: number } | null;
+
+/** Reads a part of the time from the address; null where it is none. */
+function rangeIn(since: string | null, until: string | null): Range {
+  const [from, to] = [Number(since ?? NaN), Number(until ?? NaN)];
+  return 0 <= from && from < to && to < Infinity ? { since: from, until: to } : null;
+}
 
 /** The class that the style sheet colours. */
 function looks({ work, state }: Bar): string {
@@ -48,7 +55,8 @@ export function Timeline({ store, subject }: { store: JobStore; subject: string 
   const [seen, setSeen] = useState(false);
   const [told, setTold] = useState<Told | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
-  const [range, setRange] = useState<Range>(null);
+  const [range, setRange] = useState(() => rangeIn(inAddress("since"), inAddress("until")));
+  useAddress({ since: range && String(range.since), until: range && String(range.until) });
   const [tick, setTick] = useState(0);
   useEffect(() => {
     const observer = new IntersectionObserver((entries) => {

@@ -1,6 +1,7 @@
 // A scene and its library of regions: the robot, which regions hold it, how they are connected, slices, and motions.
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { get, said } from "../common/api";
+import { inAddress, readQ, unlessUsual, useAddress, within } from "../common/address";
+import { get, MAY_START, said } from "../common/api";
 import { InClaim } from "../common/claim";
 import { positions } from "../common/kinematics";
 import { MomentText, touchingOf, useMoment } from "../common/moment";
@@ -32,7 +33,8 @@ export function LibraryIsland({ scene, known, mapped }: { scene: string; known: 
 function Library({ model, known, mapped }: { model: SceneModel; known: number; mapped: boolean }) {
   const names = useMemo(() => positions(model), [model]);
   const space: Space = useMemo(() => ({ joints: names, revolute: model.units.map((unit) => unit === "rad"), q_star: model.q_star, q_lower: model.q_lower, q_upper: model.q_upper }), [model]);
-  const [q, setQ] = useState(model.q_star.map((value, i) => Math.min(Math.max(value, model.q_lower[i]!), model.q_upper[i]!)));
+  const usual = useMemo(() => within(model, model.q_star), [model]);
+  const [q, setQ] = useState(() => within(model, readQ(inAddress("q"), names.length) ?? usual));
   const [graph, setGraph] = useState<GraphResponse | null>(null);
   const [graphProblem, setGraphProblem] = useState<string | null>(null);
   const [covered, setCovered] = useState<Coverage | null>(null);
@@ -41,6 +43,7 @@ function Library({ model, known, mapped }: { model: SceneModel; known: number; m
   const stay = useRef<HTMLDivElement>(null);
   const [pair, setPair] = useState<Approach | null>(null);
   const moment = useMoment(model.scene, q);
+  useAddress({ q: unlessUsual(q, usual) });
 
   useEffect(() => {
     let timer: ReturnType<typeof setTimeout> | undefined;
@@ -72,7 +75,7 @@ function Library({ model, known, mapped }: { model: SceneModel; known: number; m
   };
   // A pair that was asked for is painted as long as the robot is there.
   const touching = useMemo(
-    () => (pair?.q === q ? model.geometries.flatMap(({ name }, i) => (name === pair.a || name === pair.b ? i : [])) : touchingOf(model, moment)),
+    () => (pair?.q === q ? [model.geometries.flatMap(({ name }, i) => (name === pair.a || name === pair.b ? i : []))] : touchingOf(model, moment)),
     [moment, model, pair, q],
   );
   const way = motion?.way ?? [];
@@ -97,7 +100,7 @@ function Library({ model, known, mapped }: { model: SceneModel; known: number; m
           <h2 id="h-graph">Connected regions</h2>
           {graphProblem && <p class="notice bad">{graphProblem}</p>}
           {!graph ? !graphProblem && <p class={known ? "empty graph" : "empty"}>Comparing the regions …</p> : !some ? (
-            <p class="empty">This scene has no region yet. <a href={`/new?scene=${model.scene}`}>Start a job</a> that grows one.</p>
+            <p class="empty">This scene has no region yet.{MAY_START && <> <a href={`/new?scene=${model.scene}`}>Start a job</a> that grows one.</>}</p>
           ) : (
             <>
               <p class="counts">
@@ -138,12 +141,14 @@ function Library({ model, known, mapped }: { model: SceneModel; known: number; m
         </section>
           <section aria-labelledby="h-plan">
             <h2 id="h-plan">Plan a motion</h2>
-            <Planning model={model} names={names} q={q} onMove={setQ} onShow={setMotion} />
+            <Planning model={model} names={names} usual={usual} q={q} onMove={setQ} onShow={setMotion} />
           </section>
-          <section aria-labelledby="h-upload">
-            <h2 id="h-upload">Upload a path</h2>
-            <Upload model={model} onMove={setQ} onPair={showPair} onShow={setMotion} />
-          </section>
+          {MAY_START && (
+            <section aria-labelledby="h-upload">
+              <h2 id="h-upload">Upload a path</h2>
+              <Upload model={model} onMove={setQ} onPair={showPair} onShow={setMotion} />
+            </section>
+          )}
         </div>
       </div>
     </div>
@@ -158,5 +163,5 @@ function InS() {
 /** What people can do about a gap between two components. */
 function Advice({ scene, q, onLook }: { scene: string; q: number[] | null; onLook: (q: number[]) => void }) {
   if (!q) return <>no free configuration was found near its middle</>;
-  return <><button type="button" class="plain" onClick={() => onLook(q)}>look there</button> <a href={`/new?scene=${scene}&q=${q.join(",")}`}>grow a region there</a></>;
+  return <><button type="button" class="plain" onClick={() => onLook(q)}>look there</button>{MAY_START && <> <a href={`/new?scene=${scene}&q=${q.join(",")}`}>grow a region there</a></>}</>;
 }

@@ -1,16 +1,20 @@
 // A motion from a start to a goal: asked for, said why there is none, or played.
 import { useMemo, useState } from "preact/hooks";
+import { inAddress, readQ, unlessUsual, useAddress } from "../common/address";
 import { post, said } from "../common/api";
+import { asCommand, asCurl, asPython, Copies, python, shell, type Texts } from "../common/copies";
 import { movingBodies } from "../common/kinematics";
 import type { Piece, PlanResponse, SceneModel } from "../common/schema";
 import type { Part, Shown } from "./player";
-import { asked, PoseFields, typedAt, type Typed } from "./pose";
+import { asked, poseIn, PoseFields, typedAt, type Typed } from "./pose";
 import { Why } from "./why";
 import { asText, inWords, shown, typed } from "../common/units";
 
 interface Props {
   model: SceneModel;
   names: string[];
+  /** Where the robot is unless the address says otherwise. */
+  usual: number[];
   q: number[];
   onMove: (q: number[]) => void;
   /** Shows a motion, or takes the one that was shown away. */
@@ -26,22 +30,31 @@ interface End {
 /** How far a frame may be from a straight line. */
 const LINE = { metres: 1e-3, radians: (0.5 * Math.PI) / 180 };
 
-export function Planning({ model, names, q, onMove, onShow }: Props) {
+export function Planning({ model, names, usual, q, onMove, onShow }: Props) {
   const { units } = model;
   const here = (at: number[]): End => ({ text: asText(at, units), q: at });
-  const [ends, setEnds] = useState({ start: here(q), goal: here(q) });
+  const [ends, setEnds] = useState(() => ({ start: here(readQ(inAddress("from"), units.length) ?? usual), goal: here(readQ(inAddress("to"), units.length) ?? usual) }));
   const frames = useMemo(() => movingBodies(model).reverse(), [model]);
   /** The goal where it is the pose of a frame; null where it is a configuration. */
-  const [pose, setPose] = useState<Typed | null>(null);
-  const [flags, setFlags] = useState({ only: false, straight: false });
+  const [pose, setPose] = useState(() => poseIn(frames, inAddress("pose")));
+  const [flags, setFlags] = useState({ only: inAddress("regions_only") !== null, straight: inAddress("line") !== null });
   const [plan, setPlan] = useState<PlanResponse | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
   const [asking, setAsking] = useState(false);
   const words = inWords(units);
+  useAddress({
+    from: ends.start.q && unlessUsual(ends.start.q, usual),
+    to: pose ? null : ends.goal.q && unlessUsual(ends.goal.q, usual),
+    pose: pose && [pose.frame, ...pose.texts].join(","),
+    regions_only: flags.only ? "1" : null,
+    line: flags.straight ? "1" : null,
+  });
   const onPlan = (found: PlanResponse | null): void => {
     setPlan(found);
     onShow(found?.found ? shownOf(found) : null);
   };
+  /** What the service is asked for. */
+  const requested = (start: number[]): Requested => ({ scene: model.scene, start, ...(pose ? { pose: asked(pose), ...(flags.straight && { line: LINE }) } : { goal: ends.goal.q!, regions_only: flags.only }) });
   const ask = async (event: Event): Promise<void> => {
     event.preventDefault();
     const [start, goal] = [ends.start.q, ends.goal.q];
@@ -49,7 +62,7 @@ export function Planning({ model, names, q, onMove, onShow }: Props) {
     setProblem(null);
     setAsking(true);
     try {
-      const found = await post<PlanResponse>("/v1/planning/plan", { scene: model.scene, start, ...(pose ? { pose: asked(pose), ...(flags.straight && { line: LINE }) } : { goal, regions_only: flags.only }) });
+      const found = await post<PlanResponse>("/v1/planning/plan", requested(start));
       onPlan(found);
       if (found.found) onMove(found.q[0]!);
     } catch (reason) {
@@ -102,6 +115,7 @@ export function Planning({ model, names, q, onMove, onShow }: Props) {
         )}
         <button type="submit" class="primary" disabled={asking}>{asking ? "Planning …" : "Plan a motion"}</button>
       </form>
+      {ends.start.q && (pose ?? ends.goal.q) && <Copies texts={textsOf(requested(ends.start.q))} note="Positions are in radians and metres." />}
       <div role="status">
         {problem && <p class="notice bad">{problem}</p>}
         {plan && !plan.found && <Why plan={plan} names={names} units={units} onUse={use} onLook={onMove} />}
@@ -109,6 +123,27 @@ export function Planning({ model, names, q, onMove, onShow }: Props) {
       {plan?.found && <p class="found"><strong>{plan.duration!.toFixed(2)} s</strong>, {units.includes("m") ? `${plan.length!.toPrecision(3)} long in radians and metres` : `${shown(plan.length!, "rad")} long`}. The robot's view plays it.</p>}
     </div>
   );
+}
+
+interface Requested {
+  scene: string;
+  start: number[];
+  goal?: number[];
+  regions_only?: boolean;
+  pose?: ReturnType<typeof asked>;
+  line?: typeof LINE;
+}
+
+/** The same request by the command, by curl, and in Python. */
+function textsOf(body: Requested): Texts {
+  const { scene, start, goal, regions_only: only, pose, line } = body;
+  const to = pose ? [`--to-pose=${[...pose.position, ...pose.rpy].join(",")}`, `--frame=${shell(pose.frame)}`, ...(line ? ["--line", `--tolerance=${line.metres},${line.radians}`] : [])] : [`--to=${goal}`, ...(only ? ["--regions-only"] : [])];
+  const given = pose ? `pose=${python(pose)}${line ? `, line=${python(line)}` : ""}` : `${python(goal)}${only ? ", regions_only=True" : ""}`;
+  return {
+    command: asCommand("ciris", "plan", scene, `--from=${start}`, ...to),
+    curl: asCurl("/v1/planning/plan", body),
+    Python: asPython(`motion = service.plan(${python(scene)}, ${python(start)}, ${given})`, "print(motion.q, motion.t, motion.reason)"),
+  };
 }
 
 /** What proves a piece of the motion, in words. */

@@ -25,6 +25,12 @@ export function typedAt(model: SceneModel, frame: string, q: number[]): Typed {
   return { frame, texts: [...position, ...rpy.map((angle) => angle / scale)].map((value) => String(Number(value.toFixed(12)))) };
 }
 
+/** Reads a pose from the address, which has the frame and six numbers, angles as they are shown; null where it has none. */
+export function poseIn(frames: string[], text: string | null): Typed | null {
+  const [frame, ...texts] = text?.split(",") ?? [];
+  return frame && frames.includes(frame) && texts.length === FIELDS.length && texts.every((one) => one !== "" && Number.isFinite(Number(one))) ? { frame, texts } : null;
+}
+
 /** The pose as the service takes it. */
 export function asked({ frame, texts }: Typed): { frame: string; position: number[]; rpy: number[] } {
   const numbers = texts.map(Number);

@@ -1,6 +1,7 @@
 // A path from a file: certified, or shown where bodies first touch on it.
 import { useState } from "preact/hooks";
 import { post, said } from "../common/api";
+import { asCommand, asCurl, asPython, Copies, python, shell, type Texts } from "../common/copies";
 import type { Approach, MotionResponse, SceneModel } from "../common/schema";
 import type { Motion, Part, Shown } from "./player";
 import { readPath, type Path } from "../common/waypoints";
@@ -16,6 +17,7 @@ interface Props {
 type MotionVerdict = Pick<MotionResponse, "certified_to" | "stop" | "clearance" | "proved_distance" | "seconds" | "verify_seconds">;
 
 interface Answered {
+  name: string;
   path: Path;
   verdict: MotionResponse;
 }
@@ -35,7 +37,7 @@ export function Upload({ model, onMove, onPair, onShow }: Props) {
       if (typeof path === "string") setProblem(`${file.name} holds no path. ${path}`);
       else {
         const verdict = await post<MotionResponse>("/v1/planning/certify-path", { scene: model.scene, q: path.q, clearance: true });
-        setAnswered({ path, verdict });
+        setAnswered({ name: file.name, path, verdict });
         onShow(shownOf(path, verdict));
         if (verdict.stop) onPair(verdict.stop);
         else onMove(path.q[0]!);
@@ -59,9 +61,19 @@ export function Upload({ model, onMove, onPair, onShow }: Props) {
         {problem && <p class="notice bad">{problem}</p>}
         {answered && <Verdict verdict={answered.verdict} onPair={onPair} />}
       </div>
+      {answered && <Copies texts={textsOf(model.scene, answered)} note="Positions are in radians and metres." />}
       {answered && <p class="quiet small">{answered.path.t ? "The robot's view plays the times of the file as seconds, from 0 on." : "The file has no times. The robot's view plays the path so that all joints together move by 1 radian or metre a second. Your robot may move otherwise."}</p>}
     </div>
   );
+}
+
+/** The same question by the command, by curl, and in Python. */
+function textsOf(scene: string, { name, path: { q } }: Answered): Texts {
+  return {
+    command: asCommand("ciris", "certify-path", scene, `--path=${shell(name)}`, "--clearance"),
+    curl: asCurl("/v1/planning/certify-path", { scene, q, clearance: true }),
+    Python: asPython(`motion = service.certify_path(${python(scene)}, ${python(q)}, clearance=True)`, "print(motion.outcome, motion.clearance)"),
+  };
 }
 
 function Verdict({ verdict: { outcome, stop, nearest, clearance, proved_distance }, onPair }: { verdict: MotionResponse; onPair: (pair: Approach) => void }) {

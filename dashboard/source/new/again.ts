@@ -1,25 +1,59 @@
 // The form filled in: with what an earlier job was asked for, and with what the address gives.
 import type { Job } from "../common/schema";
-import { FIRST, pathOf, type Fields, type Given, type Kind, type Option, type Part, type Parts, type Wish } from "./request";
+import { readQ, written, type Stated } from "../common/address";
+import { FIRST, markName, pathOf, PRIORITIES, type Fields, type Given, type Kind, type Option, type Part, type Parts, type Wish } from "./request";
 
 export interface Start {
   scene: string | null;
   q: string | null;
   wish: Wish;
+  /** The earlier job that fills the form in. */
+  from: string | null;
 }
 
-/** What the address asks for: `scene`, `q`, `kind`, `region`, `minutes`, and any option by its path, as `options.cells`. */
+/** What the address asks for: `scene`, `q`, `kind`, `goal`, `region`, `minutes`, `priority`, each `mark`, and any option by its path, as
+ *  `options.cells`. A mark that is empty says that there are none. */
 export function asked(query: URLSearchParams, parts: Parts, from: Job | null): Start {
   const before = from ? wishOf(from, parts) : { q: null, wish: FIRST };
   const kind = query.get("kind") as Kind | null;
   const wish = { ...before.wish, ...(kind && kind in parts && { kind }) };
   const given = { ...wish.given };
-  for (const path of parts[wish.kind].flatMap(({ place, options }) => options.map(({ name }) => pathOf(place, name)))) given[path] = query.get(path) ?? given[path] ?? "";
+  const marks = query.getAll("mark");
+  for (const path of pathsOf(parts[wish.kind])) given[path] = query.get(path) ?? given[path] ?? "";
   return {
     scene: query.get("scene") ?? from?.scene ?? null,
     q: query.get("q") ?? before.q?.join(",") ?? null,
-    wish: { ...wish, given, minutes: query.get("minutes") ?? wish.minutes, region: query.get("region") ?? wish.region },
+    wish: {
+      ...wish,
+      given,
+      goal: query.get("goal") === "connect" ? "connect" : query.has("goal") ? "coverage" : wish.goal,
+      minutes: query.get("minutes") ?? wish.minutes,
+      priority: PRIORITIES.includes(query.get("priority") ?? "") ? query.get("priority")! : wish.priority,
+      region: query.get("region") ?? wish.region,
+      marks: marks.length ? marks.flatMap((text) => (text ? [readQ(text, text.split(",").length)] : [])).filter((mark) => mark !== null) : wish.marks,
+    },
+    from: from?.id ?? null,
   };
+}
+
+/** What the address says of a wish, so that it asks for the same. A file is not in it. */
+export function stated(wish: Wish, parts: Parts, { from }: Start): Stated {
+  // An earlier job may have what is empty now.
+  const said = (text: string, usual = ""): string | null => (text !== usual || from ? text : null);
+  return {
+    kind: said(wish.kind, FIRST.kind),
+    goal: wish.kind === "cover" ? said(wish.goal, FIRST.goal) : null,
+    minutes: said(wish.minutes),
+    priority: said(wish.priority, FIRST.priority),
+    region: wish.kind === "recertify" ? said(wish.region) : null,
+    mark: !markName(wish) ? null : wish.marks.length ? wish.marks.map(written) : from ? "" : null,
+    ...Object.fromEntries(pathsOf(parts[wish.kind]).map((path) => [path, said(wish.given[path] ?? "")])),
+  };
+}
+
+/** The paths of all options, those of groups' members too. */
+function pathsOf(parts: Pick<Part, "place" | "options">[]): string[] {
+  return parts.flatMap(({ place, options }) => options.flatMap((one) => [pathOf(place, one.name), ...pathsOf([{ place: pathOf(place, one.name), options: one.options }])]));
 }
 
 function wishOf(job: Job, parts: Parts): { q: number[] | null; wish: Wish } {

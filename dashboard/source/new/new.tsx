@@ -8,22 +8,21 @@ import type { ContactsResponse, Job, PlanResponse, SceneDetail, SceneModel, Scen
 import { Sliders } from "../common/sliders";
 import { ChooseScene, named, type Scene } from "./choose";
 import type { Refused } from "./options";
-import { asked, type Start as First } from "./again";
+import { asked, stated, type Start as First } from "./again";
 import { blocked, useBlocked } from "./blocked";
-import { Copies } from "./copies";
+import { JobCopies } from "./copies";
 import { isMarked, missing, request, type Parts, type Wish } from "./request";
 import { Wishes } from "./wishes";
-import { asText, withUnits } from "../common/units";
+import { readQ, useAddress, within, written } from "../common/address";
+import { asText } from "../common/units";
 
 const TRIES = 100;
 
 interface Props {
   parts: Parts;
-  /** Whether the service knows who reads the page by a key. */
-  keyed: boolean;
 }
 
-export function NewIsland({ parts, keyed }: Props) {
+export function NewIsland({ parts }: Props) {
   // The page rewrites its address, so it is read once. Its configuration is one of its scene, and of no other.
   const [first, setFirst] = useState<First | null>(null);
   const [scenes, setScenes] = useState<Scene[] | null>(null);
@@ -70,20 +69,21 @@ export function NewIsland({ parts, keyed }: Props) {
     // Its names may have meant other scenes until now.
     setScenes([scene, ...scenes.filter(({ id }) => id !== scene.id).map((other) => ({ ...other, names: other.names.filter((name) => !scene.names.includes(name)) }))]);
     choose(named(scene));
+    document.getElementById("welcome")?.remove();
   };
   return (
     <div class="new">
       <ChooseScene scenes={scenes} chosen={chosen} model={model} onChoose={choose} onUpload={take} />
       {problem && <p class="notice bad">{problem}</p>}
-      {model && <Start given={chosen!} model={model} parts={parts} keyed={keyed} first={first} key={chosen} />}
+      {model && <Start given={chosen!} model={model} parts={parts} first={first} key={chosen} />}
     </div>
   );
 }
 
-function Start({ given, model, parts, keyed, first }: Props & { given: string; model: SceneModel; first: First }) {
+function Start({ given, model, parts, first }: Props & { given: string; model: SceneModel; first: First }) {
   const names = useMemo(() => positions(model), [model]);
-  const [q, setQ] = useState(() => within(model, read(first.q, model.q_star.length) ?? model.q_star));
-  const [unread] = useState(() => first.q !== null && q.join() !== read(first.q, model.q_star.length)?.join());
+  const [q, setQ] = useState(() => within(model, readQ(first.q, model.q_star.length) ?? model.q_star));
+  const [unread] = useState(() => first.q !== null && q.join() !== readQ(first.q, model.q_star.length)?.join());
   const [wish, setWish] = useState<Wish>(first.wish);
   const [problem, setProblem] = useState<string | null>(null);
   const [refused, setRefused] = useState<Refused | null>(null);
@@ -95,7 +95,7 @@ function Start({ given, model, parts, keyed, first }: Props & { given: string; m
   const held = wish.kind === "grow" ? [q, ...wish.marks] : [];
   const between = useBlocked(model, held);
 
-  useEffect(() => history.replaceState(null, "", withUnits(new URLSearchParams({ scene: given, q: q.map((value) => Number(value.toFixed(4))).join(",") }))), [model, q.join()]);
+  useAddress({ scene: given, q: written(q), ...stated(wish, parts, first) });
 
   useEffect(() => {
     get<SceneDetail>(`/v1/scenes/${encodeURIComponent(given)}`).then(
@@ -192,18 +192,8 @@ function Start({ given, model, parts, keyed, first }: Props & { given: string; m
           {problem && <p class="notice bad">{problem}</p>}
         </div>
         <p><button type="submit" class="primary" disabled={sending}>{sending ? "Starting …" : "Start the job"}</button></p>
-        <Copies q={q} wish={wish} parts={parts} keyed={keyed} body={body} />
+        <JobCopies q={q} wish={wish} parts={parts} body={body} />
       </form>
     </div>
   );
-}
-
-function within(model: SceneModel, q: number[]): number[] {
-  return q.map((value, i) => Math.min(Math.max(value, model.q_lower[i]!), model.q_upper[i]!));
-}
-
-/** Reads joint positions from the address, radians or metres; null where they are not one for each joint. */
-function read(text: string | null, joints: number): number[] | null {
-  const numbers = text?.split(",").map(Number) ?? [];
-  return numbers.length === joints && numbers.every(Number.isFinite) ? numbers : null;
 }

@@ -52,6 +52,8 @@ export interface Wish {
   labels: Record<string, string>;
 }
 
+export const PRIORITIES = ["3", "2", "1", "0", "-1", "-2", "-3"];
+
 export const FIRST: Wish = { kind: "grow", goal: "coverage", given: {}, minutes: "", priority: "0", marks: [], file: null, region: "", kept: {}, labels: {} };
 
 /** The name of the marks in the request. */

@@ -1,7 +1,7 @@
 // The part of the form that says what the job shall do.
 import { FileField } from "./file";
 import { Options, type Refused } from "./options";
-import type { Kind, Part, Wish } from "./request";
+import { PRIORITIES, type Kind, type Part, type Wish } from "./request";
 
 interface Props {
   wish: Wish;
@@ -104,7 +104,7 @@ export function Wishes({ wish, parts, refused, onWish, marks, here, onMark, onGo
         <p class="field">
           <label for="new-priority">Priority</label>
           <select id="new-priority" value={wish.priority} onChange={(event) => set({ priority: event.currentTarget.value })}>
-            {["3", "2", "1", "0", "-1", "-2", "-3"].map((step) => <option value={step} key={step}>{step === "0" ? "0, as others" : step}</option>)}
+            {PRIORITIES.map((step) => <option value={step} key={step}>{step === "0" ? "0, as others" : step}</option>)}
           </select>
           <span class="quiet">each step up doubles its share of the work</span>
         </p>

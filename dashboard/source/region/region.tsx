@@ -1,5 +1,6 @@
 // A region to walk about in: the robot swept through it, sliders that stay inside, the ends of each joint, slices, cells.
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
+import { inAddress, readQ, unlessUsual, useAddress, within } from "../common/address";
 import { get, said } from "../common/api";
 import { InClaim } from "../common/claim";
 import { shortNames } from "../common/kinematics";
@@ -59,7 +60,11 @@ export function RegionIsland({ region }: { region: string }) {
 function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: string }) {
   const { space, halfspace_normals: C, halfspace_offsets: d } = region.manifest as unknown as Manifest;
   const faces: Faces = useMemo(() => ({ C, d }), [region]);
-  const [q, setQ] = useState(configurations.seed ?? configurations.center);
+  const usual = configurations.seed ?? configurations.center;
+  const [q, setQ] = useState(() => {
+    const given = readQ(inAddress("q"), space.joints.length);
+    return given ? within(space, given) : usual;
+  });
   const [swept, setSwept] = useState(true);
   const section = useRef<HTMLElement>(null);
   const [pair, setPair] = useState(() => named(pairs));
@@ -67,6 +72,8 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
   const [cellsProblem, setCellsProblem] = useState<string | null>(null);
   const [playing, setPlaying] = usePlay(space, configurations.samples, q, setQ);
   const only = useMemo(() => [id], [id]);
+  useAddress({ q: unlessUsual(q, usual) });
+  useEffect(() => history.replaceState(history.state, "", `${location.pathname}${location.search}${pair === null ? "" : `#pair=${pair}`}`), [pair]);
   const ghosts = useMemo(() => (swept ? configurations.samples.slice(0, GHOSTS) : []), [swept, configurations]);
   const names = shortNames(space.joints);
   const inside = contains(space, faces, q);

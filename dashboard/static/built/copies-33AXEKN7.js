@@ -1,0 +1,1 @@
+import{a,b,c,d,e,f,g}from"./chunk-RPQVLDIN.js";import"./chunk-DP73IOPF.js";import"./chunk-5EYV4CFC.js";import"./chunk-BAYTPQX6.js";export{a as Copies,g as CopiesIsland,c as asCommand,d as asCurl,f as asPython,e as python,b as shell};
