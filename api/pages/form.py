@@ -19,8 +19,29 @@ router = APIRouter()
 LISTS = (Takes.POINT, Takes.POINTS, Takes.PATHS)
 """The form has no fields for lists of numbers, nor for the method that needs them."""
 
+_LABELS = {
+    "epsilon": "Share in collision",
+    "delta": "Probability of more",
+    "max_iterations": "Rounds of IRIS",
+    "max_iterations_separating_planes": "Rounds of faces",
+    "margin": "Distance to collisions",
+    "tries": "Starting regions to try",
+    "paper": "The papers' algorithm",
+}
+"""What the page calls an option whose name says little to who has not read IRIS, or is the glossary's for something else."""
+
 OF_MOTIONS = (("clearance", Takes.FLAG), ("tube", Takes.FLAG), ("padding", Takes.REAL))
 """What may be asked for of a motion."""
+
+
+def _in_words(name: str) -> str:
+    """Returns an option's name as people read it: ``max_rounds`` as "Max rounds"."""
+    return name.capitalize().replace("_", " ")
+
+
+def _plain(text: str) -> str:
+    """Returns what an option means in the page's word for the polytope with which growth begins."""
+    return text.replace("first polytope", "starting region").replace("proposal", "starting region")
 
 
 @router.get("/new")
@@ -36,7 +57,14 @@ def new_job_page(request: Request, db: Db) -> Response:
 def _of_motion(name: str, takes: Takes) -> dict[str, Any]:
     """Describes a field of the request for a motion."""
     known = GivenMotion.model_fields[name]
-    described = {"name": name, "takes": takes, "text": known.description, "default": known.default, "argument": name}
+    described = {
+        "name": name,
+        "label": _in_words(name),
+        "takes": takes,
+        "text": known.description,
+        "default": known.default,
+        "argument": name,
+    }
     return {**described, "unit": "", "least": 0.0 if takes is Takes.REAL else None, "greatest": None, "choices": [], "options": []}
 
 
@@ -45,8 +73,9 @@ def _fields(cls: type) -> list[dict[str, Any]]:
     return [
         {
             "name": one.name,
+            "label": _LABELS.get(one.name, _in_words(one.name)),
             "takes": one.takes,
-            "text": one.described,
+            "text": _plain(one.described),
             "argument": one.argument,
             "unit": one.unit,
             "default": one.default if isinstance(one.default, int | float | str) else None,

@@ -25,7 +25,7 @@ def test_a_motion_has_its_claim_and_is_played(page: Any, url: str, planar: Scene
     verdict = client.get(f"/v1/jobs/{job}/motion").json()
     assert claim.locator("dd").all_text_contents()[:2] == ["2", f"at least {at_least_mm(verdict['clearance'])}"]
     page.get_by_label("Time, seconds").press("End")
-    page.locator(".moment", has_text="on the path, which is certified").wait_for()
+    page.locator(".moment", has_text="on the motion, which is certified").wait_for()
     length = np.linalg.norm(np.subtract(*FREE))
     assert page.locator(".player output").text_content() == f"{length:.2f} s"
     assert barriers(page) == []
@@ -66,7 +66,7 @@ def test_a_motion_that_is_straight_in_s_is_played_so(page: Any, url: str, planar
         q = planar.to_q(np.linspace(*s, len(heights)))[:, joint]
         assert (heights - heights[0]) / (heights[-1] - heights[0]) == pytest.approx((q - q[0]) / (q[-1] - q[0]), abs=2e-3)
     page.get_by_label("Time, seconds").press("End")
-    page.locator(".moment", has_text="on the path, which is certified").wait_for()
+    page.locator(".moment", has_text="on the motion, which is certified").wait_for()
 
 
 def test_a_large_distance_has_no_exponent() -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import html
 import io
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -507,6 +509,18 @@ def test_what_is_wrong_with_an_option_is_said_at_its_field(opened: Any, client: 
     assert jobs(client) == []
 
 
+def test_the_form_has_one_name_for_the_starting_region_and_each_option_another_name(client: TestClient) -> None:
+    """The glossary's word for the pages; commands and their documentation call it the proposal."""
+    text = html.unescape(client.get("/new").text)
+    assert not re.search("proposal|first polytope", text)
+    parts = json.loads(text.partition('data-island="new" data-props=\'')[2].partition("'>")[0])["parts"]
+    for kind in parts.values():
+        for part in kind:
+            labels = [option["label"] for option in part["options"]]
+            assert len(set(labels)) == len(labels)
+            assert not {"Margin", "Epsilon", "Delta"} & set(labels)
+
+
 @pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_nothing_keeps_people_out(browser: Any, url: str, planar: Scene, barriers: Any, scheme: str) -> None:
     context = browser.new_context(viewport={"width": 390, "height": 844}, color_scheme=scheme)
@@ -534,7 +548,7 @@ def test_the_form_says_that_a_box_is_for_the_papers_algorithm(opened: Any, url: 
     opened.get_by_text("only the papers' algorithm begins with the method box").wait_for()
     assert method.get_attribute("aria-invalid") == "true"
     assert complaints.pop().startswith(f"{REFUSED}422")
-    opened.get_by_label("Paper").check()
+    opened.get_by_label("The papers' algorithm").check()
     start.click()
     opened.wait_for_url(f"{url}/jobs/*")
     assert jobs(client)[0]["options"]["paper"]["contraction"] == "targeted"

@@ -1,4 +1,4 @@
-// A path from a file: certified, or shown where bodies first touch on it.
+// A motion from a file: certified, or shown where bodies first touch on it.
 import { useState } from "preact/hooks";
 import { post, said } from "../common/api";
 import { asCommand, asCurl, asPython, Copies, python, shell, type Texts } from "../common/copies";
@@ -34,7 +34,7 @@ export function Upload({ model, onMove, onPair, onShow }: Props) {
     setAsking(file.name);
     try {
       const path = readPath(file.name, await file.text());
-      if (typeof path === "string") setProblem(`${file.name} holds no path. ${path}`);
+      if (typeof path === "string") setProblem(`${file.name} holds no motion. ${path}`);
       else {
         const verdict = await post<MotionResponse>("/v1/planning/certify-path", { scene: model.scene, q: path.q, clearance: true });
         setAnswered({ name: file.name, path, verdict });
@@ -62,7 +62,7 @@ export function Upload({ model, onMove, onPair, onShow }: Props) {
         {answered && <Verdict verdict={answered.verdict} onPair={onPair} />}
       </div>
       {answered && <Copies texts={textsOf(model.scene, answered)} note="Positions are in radians and metres." />}
-      {answered && <p class="quiet small">{answered.path.t ? "The robot's view plays the times of the file as seconds, from 0 on." : "The file has no times. The robot's view plays the path so that all joints together move by 1 radian or metre a second. Your robot may move otherwise."}</p>}
+      {answered && <p class="quiet small">{answered.path.t ? "The robot's view plays the times of the file as seconds, from 0 on." : "The file has no times. The robot's view plays the motion so that all joints together move by 1 radian or metre a second. Your robot may move otherwise."}</p>}
     </div>
   );
 }
@@ -83,7 +83,7 @@ function Verdict({ verdict: { outcome, stop, nearest, clearance, proved_distance
       <div class="notice bad">
         <p>
           <strong>Not certified.</strong>{" "}
-          {outcome === "refuted" ? `${stop.a} and ${stop.b} touch. Their first contact is ${where}.` : outcome === "too_close" ? `${stop.a} and ${stop.b} are too close to tell, ${where}.` : `The path needs too many intervals. The search ended at ${stop.a} and ${stop.b}, ${where}.`}
+          {outcome === "refuted" ? `${stop.a} and ${stop.b} touch. Their first contact is ${where}.` : outcome === "too_close" ? `${stop.a} and ${stop.b} are too close to tell, ${where}.` : `The motion needs too many intervals. The search ended at ${stop.a} and ${stop.b}, ${where}.`}
         </p>
         <p><button type="button" onClick={() => onPair(stop)}>Show this place</button></p>
       </div>
@@ -91,7 +91,7 @@ function Verdict({ verdict: { outcome, stop, nearest, clearance, proved_distance
   }
   return (
     <div class="notice">
-      <p><strong class="proved">Certified.</strong> All along the path, the bodies of every pair are at least {atLeast(1000 * (clearance ?? proved_distance!))} mm apart, as proved. The scene's padding is around them.</p>
+      <p><strong class="proved">Certified.</strong> All along the motion, the bodies of every pair are at least {atLeast(1000 * (clearance ?? proved_distance!))} mm apart, as proved. The scene's padding is around them.</p>
       {nearest && <p><button type="button" onClick={() => onPair(nearest)}>Show where they are nearest</button></p>}
     </div>
   );
@@ -109,9 +109,9 @@ export function shownOf(path: Path, verdict: MotionVerdict): Shown {
   const { stop, clearance, proved_distance, seconds, verify_seconds } = verdict;
   const took = `verified now, in ${verify_seconds.toPrecision(2)} of ${seconds.toPrecision(2)} s`;
   const claim = stop ? (
-    <><span class="inside not">Not proved</span> from {parts.at(-1)!.begin.toFixed(2)} s of the path on{parts.length > 1 && <>; <span class="proved">proved</span> before, {took}</>}.</>
+    <><span class="inside not">Not proved</span> from {parts.at(-1)!.begin.toFixed(2)} s of the motion on{parts.length > 1 && <>; <span class="proved">proved</span> before, {took}</>}.</>
   ) : (
-    <><span class="proved">Proved:</span> on all of the path, the bodies of each covered pair are at least {atLeast(1000 * (clearance ?? proved_distance!))} mm apart; {took}.</>
+    <><span class="proved">Proved:</span> on all of the motion, the bodies of each covered pair are at least {atLeast(1000 * (clearance ?? proved_distance!))} mm apart; {took}.</>
   );
   return { ...motion, parts, way: parts.map(() => null), claim, file: null };
 }
@@ -125,7 +125,7 @@ function timed({ q, t }: Path): Motion {
 
 function partsOf({ t }: Motion, { certified_to: to, stop }: MotionVerdict): Part[] {
   const end = t.at(-1)!;
-  if (!stop) return [{ begin: 0, end, by: "motion", said: "on the path, which is certified" }];
+  if (!stop) return [{ begin: 0, end, by: "motion", said: "on the motion, which is certified" }];
   const until = to ? t[to.piece]! + to.time * (t[to.piece + 1]! - t[to.piece]!) : 0;
-  return [...(until > 0 ? [{ begin: 0, end: until, by: "motion", said: "on the part of the path that is certified" } as const] : []), { begin: until, end, by: "nothing", said: "where nothing is proved" }];
+  return [...(until > 0 ? [{ begin: 0, end: until, by: "motion", said: "on the part of the motion that is certified" } as const] : []), { begin: until, end, by: "nothing", said: "where nothing is proved" }];
 }

@@ -34,7 +34,7 @@ function Group({ one, path, ...rest }: FieldProps) {
   const on = rest.given[path] === "true";
   return (
     <fieldset>
-      <legend><label><input id={`option-${path}`} type="checkbox" aria-describedby={`option-${path}-says`} checked={on} onChange={() => rest.onGive(path, on ? "" : "true")} /> {inWords(one.name)}</label></legend>
+      <legend><label><input id={`option-${path}`} type="checkbox" aria-describedby={`option-${path}-says`} checked={on} onChange={() => rest.onGive(path, on ? "" : "true")} /> {one.label}</label></legend>
       <Says one={one} path={path} refused={rest.refused} />
       {on && <Options options={one.options} place={path} {...rest} />}
     </fieldset>
@@ -46,7 +46,7 @@ function Field({ one, path, given, onGive, refused }: FieldProps) {
   const about = { id: `option-${path}`, "aria-describedby": `option-${path}-says`, "aria-invalid": refused?.path === path };
   return (
     <p class="field">
-      <label for={about.id}>{inWords(one.name)}</label>
+      <label for={about.id}>{one.label}</label>
       {one.takes === "flag" ? (
         <input {...about} type="checkbox" checked={(value || String(one.default)) === "true"} onChange={({ currentTarget: { checked } }) => onGive(path, checked === (one.default ?? false) ? "" : String(checked))} />
       ) : one.takes === "choice" ? (
@@ -77,9 +77,4 @@ function Says({ one, path, refused }: Pick<FieldProps, "one" | "path" | "refused
 function bounds({ takes, least, greatest }: Option): { min?: number; max?: number; step: number | "any" } {
   const whole = takes === "whole";
   return { min: least ?? undefined, max: whole ? Math.min(greatest ?? Infinity, Number.MAX_SAFE_INTEGER) : (greatest ?? undefined), step: whole ? 1 : "any" };
-}
-
-/** `max_rounds` as "Max rounds". */
-function inWords(name: string): string {
-  return (name[0]!.toUpperCase() + name.slice(1)).replaceAll("_", " ");
 }

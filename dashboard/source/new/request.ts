@@ -3,6 +3,7 @@
 /** An option as the service describes it (api/pages/form.py). A group has options of its own. */
 export interface Option {
   name: string;
+  label: string;
   takes: "whole" | "real" | "flag" | "choice" | "group";
   text: string;
   unit: string;
