@@ -16,7 +16,22 @@ from db.workers import Made, WorkerKind
 from tests.api.conftest import store_region
 from tests.dashboard.test_pages import motion_job
 
-NAMES = ("jobs", "new", "job", "motion", "scenes", "scene", "region", "compare", "project", "inventory", "workers", "login", "problem")
+NAMES = (
+    "jobs",
+    "new",
+    "job",
+    "motion",
+    "scenes",
+    "scene",
+    "region",
+    "compare",
+    "project",
+    "inventory",
+    "workers",
+    "help",
+    "login",
+    "problem",
+)
 DRAWN = {"new": ".slider", "job": ".pairs .row", "motion": ".player", "scene": ".planning", "region": ".slider"}
 """What is there once the browser has drawn its part of a page."""
 _VERDICT: dict[str, Any] = {
@@ -48,7 +63,13 @@ def addresses(client: TestClient, database: Database, scene: Scene, region: str,
         motion_job(database, scene, _VERDICT | {"scene": {"name": "slider", "hash": scene.hash}}),
     )
     ids = [f"/jobs/{job}", f"/jobs/{motion}", "/scenes", "/scenes/slider", f"/regions/{region}", f"/compare?a={region}&b={other}"]
-    return dict(zip(NAMES, ["/", "/new?scene=slider", *ids, "/project", "/inventory", "/workers", "/login", "/jobs/none"], strict=True))
+    return dict(
+        zip(
+            NAMES,
+            ["/", "/new?scene=slider", *ids, "/project", "/inventory", "/workers", "/docs/scenes", "/login", "/jobs/none"],
+            strict=True,
+        )
+    )
 
 
 def drawn(page: Any, name: str) -> None:

@@ -72,6 +72,32 @@ def test_a_folder_is_taken_as_it_is(page: Any, url: str, client: TestClient) -> 
     page.get_by_text("planar-2dof is stored, with 2 joints and 6 pairs").wait_for()
 
 
+@pytest.mark.parametrize("compression", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
+@pytest.mark.parametrize(
+    ("seed", "shown"),
+    [
+        ("q: [0.1, -0.2]\nabout: here\n", ["5.7", "-11.5"]),
+        ("about: here\nq:\n- 0.1\n- -2e-1\n", ["5.7", "-11.5"]),
+        ("q: home\n", ["0.0", "0.0"]),
+        ("q: [0.1, 90]\n", ["5.7", "137.5"]),
+    ],
+    ids=["a list", "a list in lines", "a name", "beyond a limit"],
+)
+def test_the_robot_begins_at_the_seed_beside_the_scene_file(
+    page: Any, url: str, tmp_path: Path, seed: str, shown: list[str], compression: int
+) -> None:
+    with zipfile.ZipFile(tmp_path / "cell.zip", "w", compression) as archive:
+        for file in (ROOT / "examples" / "planar_2dof").iterdir():
+            archive.writestr(f"cell/{file.name}", seed if file.name == "seed.yaml" else file.read_bytes())
+    page.goto(f"{url}/new")
+    page.get_by_label("or upload one").set_input_files(tmp_path / "cell.zip")
+    page.get_by_text("planar-2dof is stored").wait_for()
+    page.locator(".slider").nth(1).wait_for()
+    assert [field.input_value() for field in page.locator(".slider input[type=number]").all()] == shown
+    assert page.get_by_text("stands at the seed").count() == ("home" not in seed)
+    assert page.get_by_text("The seed file does not name a configuration within the limits").count() == ("90" in seed)
+
+
 def drop(page: Any, place: Any, path: Path) -> None:
     """Drops a file or a folder on the page, as the file manager of a desktop does."""
     box = place.bounding_box()

@@ -67,17 +67,40 @@ function endOf(data: Numbers): number {
   return -1;
 }
 
-/** The paths in a zip; none where it cannot be read. */
-export async function pathsIn(file: Blob): Promise<string[]> {
-  const data = new Numbers(new Uint8Array(await file.arrayBuffer()));
+/** A file in a zip: its path, and where the directory of the zip describes it. */
+interface Listed {
+  path: string;
+  at: number;
+}
+
+/** The files in a zip; none where it cannot be read. */
+function listed(data: Numbers): Listed[] {
   const end = endOf(data);
-  const found: string[] = [];
+  const found: Listed[] = [];
   for (let k = 0, at = end < 0 ? 0 : data.four(end + 16); end >= 0 && k < data.two(end + 10) && at + 46 <= end; k++) {
     const length = data.two(at + 28);
-    found.push(new TextDecoder().decode(data.bytes.subarray(at + 46, at + 46 + length)));
+    found.push({ path: new TextDecoder().decode(data.bytes.subarray(at + 46, at + 46 + length)), at });
     at += 46 + length + data.two(at + 30) + data.two(at + 32);
   }
   return found;
+}
+
+/** The paths in a zip; none where it cannot be read. */
+export async function pathsIn(file: Blob): Promise<string[]> {
+  return listed(new Numbers(new Uint8Array(await file.arrayBuffer()))).map(({ path }) => path);
+}
+
+const DEFLATED = 8;
+
+/** The text of the one file in a zip whose path fits; null where there is none, or several. */
+export async function textIn(file: Blob, fits: RegExp): Promise<string | null> {
+  const data = new Numbers(new Uint8Array(await file.arrayBuffer()));
+  const [found, ...others] = listed(data).filter(({ path }) => fits.test(path));
+  if (!found || others.length > 0) return null;
+  const local = data.four(found.at + 42);
+  const begin = local + 30 + data.two(local + 26) + data.two(local + 28);
+  const part = new Blob([data.bytes.subarray(begin, begin + data.four(found.at + 20))]);
+  return data.two(found.at + 10) === DEFLATED ? new Response(part.stream().pipeThrough(new DecompressionStream("deflate-raw"))).text() : part.text();
 }
 
 /** A zip with one more file, stored as it is. */

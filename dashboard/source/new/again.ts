@@ -6,6 +6,8 @@ import { FIRST, markName, pathOf, PRIORITIES, type Fields, type Given, type Kind
 export interface Start {
   scene: string | null;
   q: string | null;
+  /** What gives the configuration. */
+  by: string;
   wish: Wish;
   /** The earlier job that fills the form in. */
   from: string | null;
@@ -23,6 +25,7 @@ export function asked(query: URLSearchParams, parts: Parts, from: Job | null): S
   return {
     scene: query.get("scene") ?? from?.scene ?? null,
     q: query.get("q") ?? before.q?.join(",") ?? null,
+    by: query.has("q") ? "The address" : "The earlier job",
     wish: {
       ...wish,
       given,

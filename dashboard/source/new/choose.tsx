@@ -3,6 +3,7 @@ import { useEffect, useState } from "preact/hooks";
 import { said, ServiceError, upload } from "../common/api";
 import { chosen as chosenFiles, dropped, nameOf, packed, pathsIn, saying, type Chosen } from "../common/zip";
 import type { SceneDetail, SceneModel } from "../common/schema";
+import { seedIn } from "./seed";
 
 export type Scene = Pick<SceneDetail, "id" | "name" | "names" | "joints" | "pairs" | "warnings">;
 
@@ -13,7 +14,8 @@ interface Props {
   /** The scene that is chosen; null until it is there. */
   model: SceneModel | null;
   onChoose: (scene: string) => void;
-  onUpload: (scene: Scene) => void;
+  /** `seed`: joint positions from the seed file that came along, as an address has them. */
+  onUpload: (scene: Scene, seed: string | null) => void;
 }
 
 /** What a scene is called: the name that it has or had last, where that still means it. */
@@ -47,6 +49,7 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
   const [sending, setSending] = useState<string | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
   const [added, setAdded] = useState<SceneDetail | null>(null);
+  const [seeded, setSeeded] = useState(false);
   const [choice, setChoice] = useState<Several | null>(null);
   const offers = scenes.flatMap((scene) => scene.names.map((name) => ({ ...scene, name })));
   // An address may give a scene otherwise, such as by its id.
@@ -59,9 +62,11 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
     try {
       whole = await file();
       const scene = await upload<SceneDetail>("/v1/scenes", "bundle", whole);
+      const seed = await seedIn(whole);
       setAdded(scene);
+      setSeeded(seed !== null);
       setChoice(null);
-      onUpload(scene);
+      onUpload(scene, seed);
     } catch (reason) {
       const found = whole && reason instanceof ServiceError && reason.code === "bundle_choice" ? await several(whole) : null;
       if (found?.groups.length) setChoice(found);
@@ -126,7 +131,7 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
         )}
         {added && (
           <p class="notice">
-            {added.name} is stored, with {added.joints} {added.joints === 1 ? "joint" : "joints"} and {added.pairs} {added.pairs === 1 ? "pair" : "pairs"}.
+            {added.name} is stored, with {added.joints} {added.joints === 1 ? "joint" : "joints"} and {added.pairs} {added.pairs === 1 ? "pair" : "pairs"}.{seeded && " The robot stands at the seed that came with it."}
             {added.warnings > 0 && <> Read its <a href={`/scenes/${added.id}`}>{added.warnings} {added.warnings === 1 ? "warning" : "warnings"}</a> first.</>}
           </p>
         )}

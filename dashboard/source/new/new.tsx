@@ -61,21 +61,21 @@ export function NewIsland({ parts }: Props) {
 
   if (!scenes || !first) return <p class={problem ? "notice bad" : "empty"}>{problem ?? "Loading the scenes …"}</p>;
   const model = found?.given === chosen ? found.model : null;
-  const choose = (scene: string): void => {
-    setFirst((old) => old && { ...old, q: null });
+  const choose = (scene: string, seed: string | null = null): void => {
+    setFirst((old) => old && { ...old, q: seed, by: seed === null ? old.by : "The seed file" });
     setChosen(scene);
   };
-  const take = (scene: Scene): void => {
+  const take = (scene: Scene, seed: string | null): void => {
     // Its names may have meant other scenes until now.
     setScenes([scene, ...scenes.filter(({ id }) => id !== scene.id).map((other) => ({ ...other, names: other.names.filter((name) => !scene.names.includes(name)) }))]);
-    choose(named(scene));
+    choose(named(scene), seed);
     document.getElementById("welcome")?.remove();
   };
   return (
     <div class="new">
-      <ChooseScene scenes={scenes} chosen={chosen} model={model} onChoose={choose} onUpload={take} />
+      <ChooseScene scenes={scenes} chosen={chosen} model={model} onChoose={(scene) => choose(scene)} onUpload={take} />
       {problem && <p class="notice bad">{problem}</p>}
-      {model && <Start given={chosen!} model={model} parts={parts} first={first} key={chosen} />}
+      {model && <Start given={chosen!} model={model} parts={parts} first={first} key={`${chosen} ${first.q}`} />}
     </div>
   );
 }
@@ -164,7 +164,7 @@ function Start({ given, model, parts, first }: Props & { given: string; model: S
       <div>
         <Robot model={model} q={q} onDrag={setQ} touching={touching} label={`The robot of ${model.name}${touching.length ? ", not free" : ""}`} />
         <MomentText moment={moment} />
-        {unread && <p class="notice">The address does not name a configuration within the limits: {first.q}. The robot stands at the nearest one, or at q*.</p>}
+        {unread && <p class="notice">{first.by} does not name a configuration within the limits: {first.q}. The robot stands at the nearest one, or at q*.</p>}
         <div class="card">
           <Sliders names={names} units={model.units} lower={model.q_lower} upper={model.q_upper} q={q} onChange={setQ} />
           <p class="toolbar">
