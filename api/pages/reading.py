@@ -29,8 +29,10 @@ def doc_page(request: Request, name: str) -> Response:
 def _blocks(text: str) -> Iterator[tuple[int, Markup]]:
     """Divides Markdown into headings, each with its level, and the text between them, with level 0."""
     between: list[str] = []
+    fenced = False
     for line in text.splitlines():
-        heading = _HEADING.fullmatch(line)
+        fenced ^= line.startswith("```")
+        heading = None if fenced else _HEADING.fullmatch(line)
         if heading is None:
             between.append(line)
             continue
