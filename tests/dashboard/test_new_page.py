@@ -104,6 +104,7 @@ def test_each_name_of_a_scene_is_offered_with_its_own_configurations(page: Any, 
     page.goto(f"{url}/new?scene={planar.hash[:16]}")
     page.locator(".slider").first.wait_for()
     assert select.input_value() == planar.hash[:16]
+    assert select.locator("option:checked").text_content() == f"planar · 2 joints, {len(planar.pairs)} pairs · {planar.hash[:8]}"
 
 
 def test_what_touches_is_said_live_and_no_job_starts_there(opened: Any, client: TestClient) -> None:

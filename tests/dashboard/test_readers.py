@@ -54,5 +54,5 @@ def test_a_reader_plans_and_uploads_no_path(page: Any, url: str, planar: Scene, 
         page.goto(f"{url}/scenes/planar")
         page.get_by_role("button", name="Plan a motion").wait_for()
         page.get_by_text("This scene has no region yet.").wait_for()
-        assert page.get_by_role("heading", name="Certify a motion from a file").count() == uploads
+        assert page.get_by_role("heading", name="Certify a motion").count() == uploads
         assert page.locator("main a[href^='/new']").count() == 3 * uploads

@@ -145,7 +145,7 @@ function Library({ model, known, mapped }: { model: SceneModel; known: number; m
           </section>
           {MAY_START && (
             <section aria-labelledby="h-upload">
-              <h2 id="h-upload">Certify a motion from a file</h2>
+              <h2 id="h-upload">Certify a motion</h2>
               <Upload model={model} onMove={setQ} onPair={showPair} onShow={setMotion} />
             </section>
           )}

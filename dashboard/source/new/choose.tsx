@@ -51,9 +51,9 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
   const [added, setAdded] = useState<SceneDetail | null>(null);
   const [seeded, setSeeded] = useState(false);
   const [choice, setChoice] = useState<Several | null>(null);
-  const offers = scenes.flatMap((scene) => scene.names.map((name) => ({ ...scene, name })));
+  const offers = scenes.flatMap((scene) => scene.names.map((name) => ({ ...scene, name, title: name })));
   // An address may give a scene otherwise, such as by its id.
-  if (model && chosen !== null && !offers.some(({ name }) => name === chosen)) offers.unshift({ id: model.scene, name: chosen, names: [], joints: model.q_star.length, pairs: model.pairs.length, warnings: 0 });
+  if (model && chosen !== null && !offers.some(({ name }) => name === chosen)) offers.unshift({ id: model.scene, name: chosen, title: model.name, names: [], joints: model.q_star.length, pairs: model.pairs.length, warnings: 0 });
   const send = async (name: string, file: () => Promise<File>): Promise<void> => {
     setSending(name);
     setProblem(null);
@@ -99,8 +99,8 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
         <label for="new-scene">Scene</label>
         <select id="new-scene" value={chosen ?? ""} onChange={(event) => onChoose(event.currentTarget.value)} disabled={offers.length === 0}>
           {offers.length === 0 && <option value="">none yet</option>}
-          {offers.map(({ id, name, joints, pairs }) => (
-            <option value={name} key={name}>{`${name} · ${joints} joint${joints === 1 ? "" : "s"}, ${pairs} pair${pairs === 1 ? "" : "s"} · ${id.slice(0, 8)}`}</option>
+          {offers.map(({ id, name, title, joints, pairs }) => (
+            <option value={name} key={name}>{`${title} · ${joints} joint${joints === 1 ? "" : "s"}, ${pairs} pair${pairs === 1 ? "" : "s"} · ${id.slice(0, 8)}`}</option>
           ))}
         </select>
       </p>
