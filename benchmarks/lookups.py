@@ -21,6 +21,7 @@ from certifier.map.descent import boxes
 from certifier.map.free_set import OPEN, PROVED, as_file, free_set, smallest
 from certifier.model import Array
 from certifier.proof import partition
+from certifier.proof.partition import OBLIQUE
 from ciris.free_set import FreeSet
 from client.cores import cores
 
@@ -53,15 +54,15 @@ def lookups(names: list[str], cells: int, limit: float, progress: Progress) -> d
 def enlarged(arrays: dict[str, Any], cells: int) -> dict[str, Any]:
     """Returns the arrays of a free set (certifier.map.free_set) whose open cells were cut on until there are this many proved cells."""
     rng, bounds = np.random.default_rng(0), (arrays["q_lower"], arrays["q_upper"])
-    trees = [(joint, cut) for joint, cut in zip(*(np.split(arrays[name], arrays["root"][1:]) for name in ("joint", "cut")), strict=True)]
+    trees = list(zip(*(np.split(arrays[name], arrays["root"][1:]) for name in ("joint", "cut")), strict=True))
     while (missing := cells - _count(trees, PROVED)) > 0:
         share = min(1.0, 0.5 * missing / max(1, _count(trees, OPEN)))
         before, trees = trees, [_cut_on(joint, cut, *bounds, share, rng) for joint, cut in trees]
         if _count(trees, PROVED) == _count(before, PROVED):
             break
     whole = [smallest(joint, cut) for joint, cut in trees]
-    root = np.concatenate([[0], np.cumsum([len(joint) for joint, _, _ in whole])[:-1]]).astype(np.int32)
-    upper = [np.where(joint >= 0, upper + begin, 0).astype(np.int32) for begin, (joint, _, upper) in zip(root, whole, strict=True)]
+    root = np.concatenate([[0], np.cumsum([len(joint) for joint, *_ in whole])[:-1]]).astype(np.int32)
+    upper = [np.where(joint >= 0, upper + begin, 0).astype(np.int32) for begin, (joint, _, upper, _) in zip(root, whole, strict=True)]
     joint, cut = (np.concatenate([tree[i] for tree in whole]) for i in (0, 1))
     return {**arrays, "root": root, "joint": joint, "cut": cut, "upper": np.concatenate(upper)}
 
@@ -72,8 +73,8 @@ def _count(trees: list[tuple[Array, Array]], kind: int) -> int:
 
 def _cut_on(joint: Array, cut: Array, q_lower: Array, q_upper: Array, share: float, rng: np.random.Generator) -> tuple[Array, Array]:
     """Returns a tree, its nodes' joints and cuts in preorder, in which this share of the open cells is divided in four."""
-    joint, cut, upper = smallest(joint, cut)
-    mine = np.unique(joint[joint >= 0])
+    joint, cut, upper, _ = smallest(joint, cut)
+    mine = np.unique(joint[(joint >= 0) & (joint != OBLIQUE)])
     chosen = np.flatnonzero(joint == OPEN)
     asked = rng.random(len(chosen)) < share
     if not len(mine) or not asked.any():

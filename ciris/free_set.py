@@ -20,12 +20,15 @@ from numpy.typing import ArrayLike, NDArray
 from certifier.errors import CirisError, RegionError, unreadable
 from ciris.space import Array, InSpace, Space, frozen
 
-FORMAT = 1
+FORMAT, BEFORE = 2, 1
+"""Files of the format before have no oblique cuts."""
 TOLERANCE = 1e-9
 """A configuration counts as open within TOLERANCE of an open cell in each joint, in radians or metres. Where a joint's limits are beyond 1,
 TOLERANCE is a part of the larger one. This covers rounding errors."""
 BOXES = 20_000
 """A search for the nearest proved configuration ends after about this many boxes: a third of a second, where there are 50 pairs."""
+BACK = 1e-6
+"""What was found is moved towards what was asked for as far as this is proved, less this part of the way."""
 LARGEST = 1 << 30
 """No file is read that has more bytes than this, packed or unpacked."""
 DAMAGES = (
@@ -65,7 +68,7 @@ class Closest:
     distance: float | None
     """Euclidean distance in s; 0 where the other one is proved itself, None where none was found."""
     complete: bool
-    """Whether none is nearer. False where the search ended early."""
+    """Whether none is nearer, but for what oblique cuts prove. False where the search ended early."""
     boxes: int
     """How many boxes the search looked at."""
 
@@ -117,7 +120,9 @@ class FreeSet(InSpace):
             raise CirisError("no_cache", f"what is compiled cannot be kept: {error}", field="NUMBA_CACHE_DIR", hint=hint) from None
         try:
             head, arrays = _read(data)
-            if head["format"] != FORMAT:
+            if head["format"] == BEFORE:
+                arrays["normals"] = np.zeros((0, len(head["joints"])))
+            elif head["format"] != FORMAT:
                 raise CirisError("free_set", f"it has the format {head['format']!r}, not {FORMAT}", field=name, hint=AGAIN)
             found = _checked(cls, head, arrays, lookups)
         except DAMAGES:
@@ -181,7 +186,21 @@ class FreeSet(InSpace):
             return Closest(given, 0.0, True, 0)
         aim, found = Aim(given, space.to_s(given), space.q_star, space.revolute), np.full(len(given), np.nan)
         distance, looked, complete = nearest(self._cells, aim, float(closer_than), boxes, found)
-        return Closest(None, None, complete, looked) if np.isnan(found[0]) else Closest(found, distance, complete, looked)
+        if np.isnan(found[0]):
+            return Closest(None, None, complete, looked)
+        if len(self._cells.normals):
+            found, distance = self._nearer(found, given, distance)
+        return Closest(found, distance, complete, looked)
+
+    def _nearer(self, found: Array, q: Array, distance: float) -> tuple[Array, float]:
+        """Returns where the motion from a proved configuration towards another one is proved without a gap, and its distance in s."""
+        aim = np.clip(q, self.space.q_lower, self.space.q_upper)
+        parts = self.proved_parts(found, aim)
+        if not len(parts) or parts[0, 0] > 0:
+            return found, distance
+        nearer = found + (1 - BACK) * parts[0, 1] * (aim - found)
+        left = float(np.linalg.norm(self.space.to_s(nearer) - self.space.to_s(q)))
+        return (nearer, left) if left < distance and self.contains(nearer) else (found, distance)
 
     def open_parts(self, start: ArrayLike, end: ArrayLike) -> tuple[OpenPart, ...]:
         """Returns where a motion from one configuration straight to another, (n,) each, is not proved to be free, for each group of pairs.
@@ -272,21 +291,23 @@ def _checked(cls: type[FreeSet], head: dict[str, Any], arrays: dict[str, NDArray
     n, N = len(joints), len(arrays["joint"])
     of_joints = dict.fromkeys(("q_star", "q_lower", "q_upper"), ((n,), "float64")) | {"revolute": ((n,), "bool")}
     of_nodes = {"joint": ((N,), "int16"), "cut": ((N,), "float64"), "upper": ((N,), "int32")}
+    of_cuts = {"normals": ((np.count_nonzero(arrays["joint"] == lookups.OBLIQUE), n), "float64")}
     of_trees = {name: ((len(arrays[name]),), "int32") for name in ("root", "first", "tree")}
-    shapes = of_joints | of_nodes | of_trees
+    shapes = of_joints | of_nodes | of_cuts | of_trees
     if {name: (array.shape, array.dtype.name) for name, array in arrays.items()} != shapes or not n or not N:
         raise ValueError("the arrays have other types or shapes")
     arrays = {name: frozen(array, array.dtype) for name, array in arrays.items()}
     space = Space(tuple(joints), arrays["q_star"], arrays["q_lower"], arrays["q_upper"], arrays["revolute"])
     tolerance = frozen(TOLERANCE * np.maximum(np.maximum(np.abs(space.q_lower), np.abs(space.q_upper)), 1))
     joint, cut, upper, root, first, tree = (arrays[name] for name in ("joint", "cut", "upper", "root", "first", "tree"))
-    inner = np.flatnonzero(joint >= 0)
+    inner, oblique = np.flatnonzero(joint >= 0), np.flatnonzero(joint == lookups.OBLIQUE)
     parts = np.concatenate([inner + 1, upper[inner], root])
     fits = [
         all(isinstance(joint, str) for joint in joints),
         np.isfinite(space.q_star).all() and np.isfinite(tolerance).all() and (space.q_lower <= space.q_upper).all(),
-        (joint >= lookups.OPEN).all() and (joint < n).all() and np.isfinite(cut).all(),
-        (upper[inner] > inner + 1).all() and (upper[inner] < N).all(),
+        (joint >= lookups.OPEN).all() and (np.delete(joint, oblique) < n).all() and np.isfinite(cut).all(),
+        (upper[inner] > inner + 1).all() and (upper[inner] < N).all() and np.isfinite(arrays["normals"]).all(),
+        (upper[oblique] == oblique + 2).all() and (joint[np.minimum(oblique + 1, N - 1)] == lookups.PROVED).all(),
         # Each node is the root of a tree, or a part of one other node. So these are trees.
         len(parts) == N and (parts >= 0).all() and (parts < N).all() and np.bincount(parts, minlength=N).all(),
         len(first) == 1 + len(clauses) > 1 and first[0] == 0 and first[-1] == len(tree),
@@ -295,7 +316,8 @@ def _checked(cls: type[FreeSet], head: dict[str, Any], arrays: dict[str, NDArray
     if not all(fits) or lookups.depth(joint, upper) > lookups.DEPTH:
         raise ValueError("the arrays do not fit each other")
     nodes, number = lookups.nodes_of(joint, cut, upper)
-    cells = lookups.Cells(frozen(nodes, nodes.dtype), frozen(number[root], np.int32), first, tree, space.q_lower, space.q_upper, tolerance)
+    of_space = space.q_star, space.revolute, space.q_lower, space.q_upper
+    cells = lookups.Cells(frozen(nodes, nodes.dtype), frozen(number[root], np.int32), first, tree, arrays["normals"], *of_space, tolerance)
     return cls(str(head["scene"]), str(head["name"]), space, clauses, cells)
 
 

@@ -3,6 +3,9 @@
 A motion is straight in q, from ``x`` to ``y`` while t goes from 0 to 1; at a configuration, x is y. A tree is walked with a range of t: at
 a cut, each part gets the range in which the motion is on its side, or nearer to the cut than a tolerance. The tolerance is far above
 rounding errors, so a walk visits every cell that the motion meets.
+
+An oblique cut is a half-space {s: normal . s <= cut}. What is in the half-space is proved; what is not is in the upper part. Oblique cuts
+have the tolerance already (certifier.map.free_set).
 """
 
 from __future__ import annotations
@@ -16,12 +19,14 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 PROVED, OPEN = -1, -2
 """In the place of a node, these are leaves: a cell with a proof, and one without."""
+OBLIQUE = 127
+"""In the place of a joint, this is an oblique cut."""
 
 NODE = np.dtype([("cut", np.float64), ("upper", np.int32), ("joint", np.int16), ("lower", np.int16)])
 """A cut of a tree, in one piece, because a step down a large tree takes as long as the memory does.
 
 ``joint`` is cut at ``cut``, in q. ``upper`` is the node of the upper part, or a leaf. The lower part's node follows, where ``lower`` is no
-leaf.
+leaf. Of an oblique cut, ``upper`` is the row of its normal, ``cut`` is in s, and ``lower`` and the node that follows are its upper part.
 """
 
 DEPTH = 512
@@ -29,6 +34,8 @@ DEPTH = 512
 
 ROOM = 64
 """There is room for this many ranges at first."""
+HALVINGS = 16
+"""Where a motion passes an oblique cut is known up to this many halvings of the motion."""
 
 
 class Cells(NamedTuple):
@@ -39,6 +46,9 @@ class Cells(NamedTuple):
         root: (T,) int32, the first node of each tree, or a leaf.
         first: (K + 1,) int32, where the trees of each clause begin in ``tree``.
         tree: int32, the trees of all clauses. A clause holds where one of its trees has a proved cell.
+        normals: (O, n) of the oblique cuts.
+        q_star: (n,) the positions at which s is 0.
+        revolute: (n,) True where s = tan((q - q*) / 2), False where s = q - q*.
         q_lower, q_upper: (n,) the joint limits.
         tolerance: (n,) of each joint.
     """
@@ -47,6 +57,9 @@ class Cells(NamedTuple):
     root: NDArray[np.int32]
     first: NDArray[np.int32]
     tree: NDArray[np.int32]
+    normals: Floats
+    q_star: Floats
+    revolute: NDArray[np.bool_]
     q_lower: Floats
     q_upper: Floats
     tolerance: Floats
@@ -56,8 +69,8 @@ def nodes_of(joint: NDArray[np.int16], cut: Floats, upper: NDArray[np.int32]) ->
     """Returns the cuts of trees, of type NODE, and for each given node which of these it is, or which leaf.
 
     Args:
-        joint: for each node, in preorder, the joint that is cut, or PROVED, or OPEN.
-        cut: where, in q.
+        joint: for each node, in preorder, the joint that is cut, or OBLIQUE, or PROVED, or OPEN.
+        cut: where, in q; of oblique cuts, in s.
         upper: the node of the upper part.
     """
     inner = np.flatnonzero(joint >= 0)
@@ -66,6 +79,8 @@ def nodes_of(joint: NDArray[np.int16], cut: Floats, upper: NDArray[np.int32]) ->
     nodes = np.zeros(len(inner), NODE)
     nodes["cut"], nodes["joint"], nodes["upper"] = cut[inner], joint[inner], number[upper[inner]]
     nodes["lower"] = np.minimum(number[inner + 1], 0)
+    oblique = np.flatnonzero(nodes["joint"] == OBLIQUE)
+    nodes["lower"][oblique], nodes["upper"][oblique] = np.minimum(nodes["upper"][oblique], 0), np.arange(len(oblique))
     return nodes, number
 
 
@@ -76,17 +91,19 @@ def points(cells: Cells, X: Floats, found: NDArray[np.bool_]) -> None:
     All of them are looked up in one tree after the other, which stays in the cache.
     """
     nodes, tolerance, stack, room = cells.nodes, cells.tolerance, _stack(), np.empty((2, ROOM, 2))
-    left, count = np.empty(len(X), np.int64), 0
+    left, count, S = np.empty(len(X), np.int64), 0, np.empty(X.shape)
     for i in range(len(X)):
         left[count] = i
         count += _within(cells, X[i])
+        if len(cells.normals):
+            _fill_s(cells, X[i], X[i], 0.0, S[i])
     for clause in range(len(cells.first) - 1):
         begin, end, n = cells.first[clause], cells.first[clause + 1], 0
         for place in range(count):
             i, leaf, near = left[place], OPEN, False
             for number in range(begin, end):
                 if leaf == OPEN:
-                    leaf, close = _leaf(nodes, tolerance, cells.root[cells.tree[number]], X[i])
+                    leaf, close = _leaf(nodes, tolerance, cells.normals, cells.root[cells.tree[number]], X[i], S[i])
                     near = near or close
             if near:
                 open_parts = _open_in_clause(cells, clause, X[i], X[i], True, stack, room[0], room[1])[1]
@@ -100,15 +117,37 @@ def points(cells: Cells, X: Floats, found: NDArray[np.bool_]) -> None:
 
 
 @njit(cache=True)
-def _leaf(nodes: NDArray[np.void], tolerance: Floats, root: int, x: Floats) -> tuple[int, bool]:
-    """Returns the leaf of a tree that a configuration is in, and whether it is nearer to a cut than the tolerance."""
+def _leaf(nodes: NDArray[np.void], tolerance: Floats, normals: Floats, root: int, x: Floats, s: Floats) -> tuple[int, bool]:
+    """Returns the leaf of a tree that a configuration is in, and whether it is nearer to a cut of a joint than the tolerance."""
     node, near = root, False
     while node >= 0:
         at = nodes[node]
+        if at.joint == OBLIQUE:
+            if _along(normals[at.upper], s) <= at.cut:
+                return PROVED, near
+            node = lower_part(nodes, node)
+            continue
         beyond = x[at.joint] - at.cut
         near = near | (abs(beyond) <= tolerance[at.joint])
         node = at.upper if beyond > 0 else lower_part(nodes, node)
     return node, near
+
+
+@njit(cache=True)
+def _along(normal: Floats, s: Floats) -> float:
+    """Returns where a configuration is along a normal."""
+    t = 0.0
+    for j in range(len(s)):
+        t += normal[j] * s[j]
+    return t
+
+
+@njit(cache=True)
+def _fill_s(cells: Cells, x: Floats, y: Floats, t: float, s: Floats) -> None:
+    """Fills in where a motion is at t, in s."""
+    for j in range(len(s)):
+        offset = x[j] + t * (y[j] - x[j]) - cells.q_star[j]
+        s[j] = np.tan(offset / 2) if cells.revolute[j] else offset
 
 
 @njit(cache=True)
@@ -121,14 +160,14 @@ def lower_part(nodes: NDArray[np.void], node: int) -> int:
 @njit(cache=True, nogil=True)
 def motions(cells: Cells, X: Floats, Y: Floats, found: NDArray[np.bool_]) -> None:
     """Fills in which motions, from (m, n) to (m, n), are within the joint limits and free all along."""
-    nodes, tolerance, stack, room = cells.nodes, cells.tolerance, _stack(), np.empty((2, ROOM, 2))
+    stack, room = _stack(), np.empty((2, ROOM, 2))
     for i in range(len(X)):
         x, y, holds = X[i], Y[i], _within(cells, X[i]) and _within(cells, Y[i])
         for clause in range(len(cells.first) - 1):
             if not holds:
                 break
             first, last = cells.first[clause], cells.first[clause + 1] - 1
-            holds = _open_in_tree(nodes, tolerance, cells.root[cells.tree[first]], x, y, 0.0, 1.0, True, stack, room[0], 0) == 0
+            holds = _open_in_tree(cells, cells.root[cells.tree[first]], x, y, 0.0, 1.0, True, stack, room[0], 0) == 0
             if not holds and first < last:  # several trees may prove one part each
                 holds = _open_in_clause(cells, clause, x, y, True, stack, room[0], room[1])[1] == 0
         found[i] = holds
@@ -183,7 +222,7 @@ def _open_in_clause(
         root, first, i, n = cells.root[cells.tree[place]], one and place == end - 1, 0, 0
         while i < count and not (n and first):
             a, b = ranges[i]
-            more = _open_in_tree(cells.nodes, cells.tolerance, root, x, y, a, b, first, stack, others, n)
+            more = _open_in_tree(cells, root, x, y, a, b, first, stack, others, n)
             if more > len(others):
                 larger = np.empty((2 * len(others), 2))
                 larger[: len(others)] = others
@@ -198,8 +237,7 @@ def _open_in_clause(
 
 @njit(cache=True)
 def _open_in_tree(
-    nodes: NDArray[np.void],
-    tolerance: Floats,
+    cells: Cells,
     root: int,
     x: Floats,
     y: Floats,
@@ -215,11 +253,20 @@ def _open_in_tree(
     Returns:
         How many there are now; more than there is room for where there is too little.
     """
-    waiting, spans = stack
+    nodes, tolerance, (waiting, spans) = cells.nodes, cells.tolerance, stack
     node, a, b, top = root, begin, end, 0
     while True:
         if node >= 0:
             j, v, upper = nodes[node].joint, nodes[node].cut, nodes[node].upper
+            if j == OBLIQUE:
+                beyond = _beyond(cells, cells.normals[upper], v, x, y, a, b)
+                node = PROVED if beyond[0] > beyond[1] else lower_part(nodes, node)
+                if beyond[2] <= beyond[3]:
+                    waiting[top], spans[top, 0], spans[top, 1] = node, beyond[2], beyond[3]
+                    top += 1
+                if node != PROVED:
+                    a, b = beyond[0], beyond[1]
+                continue
             near = tolerance[j]
             if max(x[j], y[j]) < v - near:  # most cuts are far from all of the motion
                 node = lower_part(nodes, node)
@@ -260,6 +307,45 @@ def _open_in_tree(
             return n
         top -= 1
         node, a, b = waiting[top], spans[top, 0], spans[top, 1]
+
+
+@njit(cache=True)
+def _beyond(
+    cells: Cells, normal: Floats, value: float, x: Floats, y: Floats, begin: float, end: float
+) -> tuple[float, float, float, float]:
+    """Returns where a motion may be beyond an oblique cut: two ranges of t, in order, of which both or the second one may be empty.
+
+    In a part of the motion, s_j is monotone, and |s_j''| = way_j^2 / 2 |s_j| (1 + s_j^2) is largest at an end. So normal . s is nowhere
+    farther from its chord than an eighth of the sum of |normal_j| times these, times the square of the part's length.
+    """
+    n, found = len(x), (np.inf, -np.inf, np.inf, -np.inf)
+    ends, level, waiting = np.empty((2, n)), np.zeros(HALVINGS + 2, np.int64), np.empty((HALVINGS + 2, 2))
+    waiting[0, 0], waiting[0, 1], top = begin, end, 1
+    while top:
+        top -= 1
+        a, b, halvings = waiting[top, 0], waiting[top, 1], level[top]
+        _fill_s(cells, x, y, a, ends[0])
+        _fill_s(cells, x, y, b, ends[1])
+        first, last, bent = _along(normal, ends[0]) - value, _along(normal, ends[1]) - value, 0.0
+        for j in range(n):
+            if cells.revolute[j]:
+                s = max(abs(ends[0, j]), abs(ends[1, j]))
+                bent += abs(normal[j]) * (y[j] - x[j]) ** 2 / 2 * s * (1 + s * s)
+        bent *= (b - a) ** 2 / 8
+        if max(first, last) + bent <= 0:
+            continue
+        if min(first, last) - bent <= 0 and halvings < HALVINGS and a < b:
+            middle = (a + b) / 2
+            waiting[top, 0], waiting[top, 1], waiting[top + 1, 0], waiting[top + 1, 1] = middle, b, a, middle
+            level[top] = level[top + 1] = halvings + 1
+            top += 2
+        elif found[0] > found[1]:
+            found = a, b, np.inf, -np.inf
+        elif found[2] > found[3] and a <= found[1]:
+            found = found[0], b, np.inf, -np.inf
+        else:
+            found = found[0], found[1], min(found[2], a), b
+    return found
 
 
 @njit(cache=True)

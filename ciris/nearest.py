@@ -1,8 +1,8 @@
 """A compiled search for the configuration of a free set (ciris.free_set) that is nearest to another one. Distances are those of s.
 
-What is not free is a union of boxes in q: the open cells, with a margin around them. The search holds boxes about which it knows nothing,
-and takes the one whose nearest configuration is nearest of all. This configuration is free, or it is in an open cell. Then the box without
-this cell is divided into others.
+What is not free is a union of boxes in q: the open cells, with a margin around them. What oblique cuts prove of them counts as open, too.
+The search holds boxes about which it knows nothing, and takes the one whose nearest configuration is nearest of all. This configuration is
+free, or it is in an open cell. Then the box without this cell is divided into others.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ciris.lookups import DEPTH, OPEN, Cells, Floats, lower_part
+from ciris.lookups import DEPTH, OBLIQUE, OPEN, Cells, Floats, lower_part
 
 MARGIN = 2.0
 """The answer is this many tolerances away from open cells and from the joint limits, so that rounding leaves it free."""
@@ -169,6 +169,9 @@ def _open_at(cells: Cells, root: int, x: Floats, found: Floats, waiting: NDArray
     while True:
         if node >= 0:
             j, v, upper = cells.nodes[node].joint, cells.nodes[node].cut, cells.nodes[node].upper
+            if j == OBLIQUE:
+                node = lower_part(cells.nodes, node)
+                continue
             near = cells.tolerance[j]
             if x[j] > v + near:
                 found[0, j], node = v, upper

@@ -10,12 +10,12 @@ import numpy as np
 
 N = 3
 LIMIT = 2.0
-PROVED, OPEN = -1, -2
+PROVED, OPEN, OBLIQUE = -1, -2, 127
 
 
 def written(path: Path, wanted: list[list[Any]], **changes: Any) -> Path:
-    """A file as ``ciris free-set`` writes them."""
-    joint, cut, upper, root, first, tree = [], [], [], [], [0], []
+    """A file as ``ciris free-set`` writes them. A node is a leaf; or joint, cut, lower and upper part, and the normal of an oblique cut."""
+    joint, cut, upper, root, first, tree, normals = [], [], [], [], [0], [], []
 
     def add(node: Any) -> None:
         at = len(joint)
@@ -23,6 +23,7 @@ def written(path: Path, wanted: list[list[Any]], **changes: Any) -> Path:
         cut.append(0.0 if isinstance(node, int) else node[1])
         upper.append(0)
         if not isinstance(node, int):
+            normals.extend(node[4:])
             add(node[2])
             upper[at] = len(joint)
             add(node[3])
@@ -34,7 +35,7 @@ def written(path: Path, wanted: list[list[Any]], **changes: Any) -> Path:
             add(node)
         first.append(len(tree))
     head = {
-        "format": 1,
+        "format": 2,
         "scene": "0" * 64,
         "name": "cell",
         "joints": ["a", "b", "c"],
@@ -48,6 +49,7 @@ def written(path: Path, wanted: list[list[Any]], **changes: Any) -> Path:
         "joint": np.array(joint, np.int16),
         "cut": np.array(cut),
         "upper": np.array(upper, np.int32),
+        "normals": np.array(normals, float).reshape(-1, N),
         "root": np.array(root, np.int32),
         "first": np.array(first, np.int32),
         "tree": np.array(tree, np.int32),

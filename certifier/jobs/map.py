@@ -131,7 +131,7 @@ def grow_round(growing: Growing, work: Work, coverage: float, over: Callable[[],
     Args:
         over: says why the map is to end now, or returns None.
     """
-    if growing.coverage.share >= coverage:
+    if growing.coverage.share >= coverage and not growing.wants:
         return "coverage"
     if reason := ("size" if growing.full else over()):
         return reason

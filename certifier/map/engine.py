@@ -7,6 +7,8 @@ A cell is a box. It goes through these steps, until it has a plane or is cut:
     a plane, affine in s, is looked for                         -> there is none: it is cut
     proofs that all vertices keep to their sides                -> too many pieces: it is cut
 
+Before it is cut in a joint, an oblique cut is tried now and then, with a plane for the part without contacts (certifier.map.oblique).
+
 Coarse volumes come first, on levels (certifier.partition.levels). A cell that is narrow in all joints that move them goes on to the next
 level, and one that is narrow in all joints stays open.
 """
@@ -19,16 +21,20 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from certifier.map.settle import CONTACTS, DONE, TOUCH, Levels, joint_to_cut, middle, settle, turn
+from certifier.map.descent import along
+from certifier.map.oblique import MOST_JOINTS, cut_off
+from certifier.map.settle import CONTACTS, DONE, NARROW, TOUCH, Levels, joint_to_cut, middle, settle, turn
 from certifier.model import Array
 from certifier.partition.bodies import Pair
 from certifier.partition.hulls import gaps
-from certifier.partition.search import NARROW, NARROW_APART, NARROW_COARSE, NARROW_CUT
+from certifier.partition.search import NARROW_APART, NARROW_COARSE, NARROW_CUT
 from certifier.partition.sides import Proofs, room_for
-from certifier.proof.partition import OPEN, PLANE
+from certifier.proof.partition import OBLIQUE, OPEN, PLANE
 
 LOOKED_AT, MOSTLY = 16, 0.6
 """A cell goes on to the next level at once where coarse volumes touch at more than MOSTLY of LOOKED_AT samples in it."""
+WAIT = 2
+"""After an oblique cut was tried, a cell is cut WAIT times in joints before the next one is."""
 
 
 class Work(NamedTuple):
@@ -39,8 +45,10 @@ class Work(NamedTuple):
         lower, upper: (N, k) the bounds.
         level: how many levels, the finest ones, are to be tried; 0 where the cell is not looked at any more.
         contacts, known: (N, CONTACTS, k) and (N,) configurations at which the volumes of its level touch, and how many are known.
+        waits: how many times the cell is to be cut in joints before an oblique cut is tried.
         begin, end: which part of the order of the samples is in the cell.
-        plane: the number of its plane.
+        plane: the number of its plane; of an oblique cut, its own number, which is the row of its normal.
+        normals: (N, k).
     """
 
     kinds: Array
@@ -51,17 +59,20 @@ class Work(NamedTuple):
     level: Array
     contacts: Array
     known: Array
+    waits: Array
     begin: Array
     end: Array
     plane: Array
+    normals: Array
 
 
-def empty(room: int, k: int) -> Work:
-    """Returns room for this many cells of k joints."""
-    level, known, begin, end, plane = np.zeros((5, room), np.int64)
-    lower, upper = np.empty((2, room, k))
+def empty(given: int, most: int, k: int) -> Work:
+    """Returns room for the cells of k joints that some cells are cut into when ``most`` are looked at."""
+    room = given + 4 * most
+    level, known, waits, begin, end, plane = np.zeros((6, room), np.int64)
+    lower, upper, normals = np.empty((3, room, k))
     kinds, children, contacts = np.full(room, OPEN, np.int16), np.zeros((room, 2), np.int32), np.empty((room, CONTACTS, k))
-    return Work(kinds, np.zeros(room), children, lower, upper, level, contacts, known, begin, end, plane)
+    return Work(kinds, np.zeros(room), children, lower, upper, level, contacts, known, waits, begin, end, plane, normals)
 
 
 class Kept(NamedTuple):
@@ -69,7 +80,7 @@ class Kept(NamedTuple):
 
     Attributes:
         planes, choices: (P, 5, 1 + k), (P,) as a proof has them.
-        bounds: (P + 1, 2) where the nodes of pieces of each plane begin, and how many pieces are before them.
+        bounds: (P + 1, 3) where the nodes of pieces of each plane begin, its pieces, and its multipliers.
         held: (1,) how many planes there are.
     """
 
@@ -79,10 +90,18 @@ class Kept(NamedTuple):
     held: Array
 
 
+class Streams(NamedTuple):
+    """Room for the nodes of pieces of planes, the counts of multipliers of pieces, and the multipliers, (R,) each."""
+
+    pieces: Array
+    counts: Array
+    multipliers: Array
+
+
 @njit(cache=True)
 def advance(
     pairs: tuple[Pair, ...], levels: Levels, work: Work, given: int, order: Array, samples: Array, weights: Array, most: int, water: float
-) -> tuple[int, int, Kept, Array]:
+) -> tuple[int, int, Kept, tuple[Array, Array, Array]]:
     """Works on cells until ``most`` were looked at or none has a weight above ``water``.
 
     Args:
@@ -92,15 +111,17 @@ def advance(
         samples, weights: (S, k), (S,).
 
     Returns:
-        How many nodes there are now, how many cells were looked at, the planes, and their pieces.
+        How many nodes there are now, how many cells were looked at, the planes, and their pieces, counts and multipliers.
     """
     k, vertices, most_pieces = samples.shape[1], 0, 0
     for pair in pairs:
         most_pieces = max(most_pieces, pair.pieces)
         vertices = max(vertices, len(pair.first.vertices) + len(pair.second.vertices))
     proofs, first = room_for(vertices, most_pieces), np.zeros(3, np.int64)
-    kept = Kept(np.zeros((most, 5, 1 + k)), np.empty(most, np.int8), np.zeros((most + 1, 2), np.int64), np.zeros(1, np.int64))
-    pieces, size, looked = np.empty(2 * len(proofs.pieces), np.int8), given, 0
+    room = 2 * most  # a cell may have a plane for a part of it, and then one for all of it
+    kept = Kept(np.zeros((room, 5, 1 + k)), np.empty(room, np.int8), np.zeros((room + 1, 3), np.int64), np.zeros(1, np.int64))
+    needed, size, looked = 2 * len(proofs.pieces), given, 0
+    streams = _streams(2 * needed)
     heap = [(-_weight(work, order, weights, i), i) for i in range(given)]
     heapq.heapify(heap)
     while len(heap) and looked < most:
@@ -108,17 +129,25 @@ def advance(
         if -weight <= water:
             break
         looked += 1
-        begin = kept.bounds[kept.held[0], 0]
-        if begin + len(proofs.pieces) > len(pieces):
-            pieces = np.concatenate((pieces, np.empty_like(pieces)))
-        joint = _tried(pairs, levels, work, cell, order, samples, proofs, first, kept, pieces[begin:])
+        if kept.bounds[kept.held[0]].max() + needed > len(streams.pieces):
+            more = _streams(2 * len(streams.pieces))
+            for i in range(len(streams.pieces)):
+                more.pieces[i], more.counts[i], more.multipliers[i] = streams.pieces[i], streams.counts[i], streams.multipliers[i]
+            streams = more
+        joint, cell, size = _tried(pairs, levels, work, cell, size, order, samples, proofs, first, kept, streams)
         if joint >= 0 and _cut(levels, work, cell, size, joint, order, samples):
             for child in range(size, size + 2):
                 of_child = _weight(work, order, weights, child)
                 if of_child > 0:
                     heapq.heappush(heap, (-of_child, child))
             size += 2
-    return size, looked, kept, pieces
+    ends = kept.bounds[kept.held[0]]
+    return size, looked, kept, (streams.pieces[: ends[0]], streams.counts[: ends[1]], streams.multipliers[: ends[2]])
+
+
+@njit(cache=True)
+def _streams(room: int) -> Streams:
+    return Streams(np.empty(room, np.int8), np.empty(room, np.int16), np.empty(room, np.float32))
 
 
 @njit(cache=True)
@@ -136,15 +165,22 @@ def _tried(
     levels: Levels,
     work: Work,
     cell: int,
+    size: int,
     order: Array,
     samples: Array,
     proofs: Proofs,
     first: Array,
     kept: Kept,
-    pieces: Array,
-) -> int:
-    """Tries a cell with one level after the other, and returns the joint to cut it in; -1 for a cell that has a plane now."""
+    streams: Streams,
+) -> tuple[int, int, int]:
+    """Tries a cell with one level after the other.
+
+    Returns:
+        The joint to cut, or -1 where nothing is left to cut; the cell to cut, which is another node after an oblique cut; how many nodes
+        there are.
+    """
     lower, upper, s, level = work.lower[cell], work.upper[cell], np.empty(samples.shape[1]), min(work.level[cell], levels.number) - 1
+    tries = work.waits[cell] == 0
     while True:
         pair = pairs[level]
         if level and _touch_mostly(pair, order[work.begin[cell] : work.end[cell]], samples):
@@ -154,11 +190,21 @@ def _tried(
             kind, work.known[cell], halved = settle(pair, lower, upper, work.contacts[cell], work.known[cell], proofs, first, plane, s)
             if kind == DONE:
                 work.kinds[cell], work.plane[cell] = PLANE, kept.held[0]
-                _keep(pair, levels.choices[level], plane, proofs, first, kept, pieces)
-                return -1
+                _keep(pair, levels.choices[level], plane, proofs, first, kept, streams)
+                return -1, cell, size
+            if tries and len(pair.joints) <= MOST_JOINTS:
+                work.waits[cell] = WAIT
+                inside = samples[order[work.begin[cell] : work.end[cell]]]
+                found, normal, value, plane, parts, ends = cut_off(pair, lower, upper, inside)
+                if found:
+                    _cut_off(work, cell, size, normal, value, kept.held[0], order, samples)
+                    _keep(pair, levels.choices[level], plane, parts, ends, kept, streams)
+                    cell, size, tries = size + 1, size + 2, False
+                    if work.begin[cell] == work.end[cell]:
+                        return -1, cell, size
             joint = joint_to_cut(pair, levels, level, lower, upper, s, halved)
             if level == 0 or _worth_a_cut(pair, levels, level, lower, upper, kind, joint):
-                return joint
+                return joint, cell, size
         work.level[cell] = level
         level -= 1
         # What touches on a finer level is looked at anew.
@@ -185,16 +231,42 @@ def _worth_a_cut(pair: Pair, levels: Levels, level: int, lower: Array, upper: Ar
 
 
 @njit(cache=True)
-def _keep(pair: Pair, choice: int, plane: Array, proofs: Proofs, first: Array, kept: Kept, pieces: Array) -> None:
+def _keep(pair: Pair, choice: int, plane: Array, proofs: Proofs, first: Array, kept: Kept, streams: Streams) -> None:
     """Keeps a plane and its pieces as a proof has them whose planes move with all joints."""
     at = kept.held[0]
+    begin = kept.bounds[at]
     kept.planes[at, :, 0], kept.choices[at] = plane[:, 0], choice
     for e in range(len(pair.joints)):
         kept.planes[at, :, 1 + pair.joints[e]] = plane[:, 1 + e]
-    _renumbered(pair, proofs.pieces, first[0], proofs.lengths[0], pieces)
-    for i in range(2):
-        kept.bounds[at + 1, i] = kept.bounds[at, i] + proofs.lengths[i]
+    _renumbered(pair, proofs.pieces, first[0], proofs.lengths[0], streams.pieces[begin[0] :])
+    streams.counts[begin[1] : begin[1] + proofs.lengths[1]] = proofs.counts[: proofs.lengths[1]]
+    streams.multipliers[begin[2] : begin[2] + proofs.lengths[2]] = proofs.multipliers[: proofs.lengths[2]]
+    for i in range(3):
+        kept.bounds[at + 1, i] = begin[i] + proofs.lengths[i]
     kept.held[0] += 1
+
+
+@njit(cache=True)
+def _cut_off(work: Work, cell: int, size: int, normal: Array, value: float, plane: int, order: Array, samples: Array) -> None:
+    """Cuts a cell by a face. The node ``size`` is the lower part, which has a plane, and the next one the whole cell, once more."""
+    work.kinds[cell], work.values[cell], work.plane[cell], work.normals[cell] = OBLIQUE, value, cell, normal
+    work.children[cell] = size, size + 1
+    work.kinds[size], work.plane[size] = PLANE, plane
+    rest, end = size + 1, work.end[cell]
+    held = order[work.begin[cell] : end].copy()
+    at = end
+    for x in range(len(held) - 1, -1, -1):
+        if along(normal, samples[held[x]]) > value:
+            at -= 1
+            order[at] = held[x]
+    before = work.begin[cell]
+    for i in held:
+        if along(normal, samples[i]) <= value:
+            order[before] = i
+            before += 1
+    work.kinds[rest], work.begin[rest], work.end[rest] = OPEN, at, end
+    work.lower[rest], work.upper[rest], work.level[rest] = work.lower[cell], work.upper[cell], work.level[cell]
+    work.contacts[rest], work.known[rest], work.waits[rest] = work.contacts[cell], work.known[cell], work.waits[cell]
 
 
 @njit(cache=True)
@@ -212,6 +284,7 @@ def _cut(levels: Levels, work: Work, cell: int, size: int, joint: int, order: Ar
     for part in range(2):
         child = size + part
         work.children[cell, part], work.kinds[child], work.level[child] = child, OPEN, work.level[cell]
+        work.waits[child] = max(work.waits[cell] - 1, 0)
         work.lower[child], work.upper[child] = lower, upper
         work.begin[child], work.end[child] = (work.begin[cell], below) if part == 0 else (below, work.end[cell])
         if part == 0:

@@ -20,15 +20,19 @@ from certifier.conditions import called
 from certifier.errors import ProofError
 from certifier.model import Array, Pair, Scene
 from certifier.proof.map import MapProof, PairMap
-from certifier.proof.partition import PLANE
+from certifier.proof.partition import OBLIQUE, PLANE
 from certifier.proof.sub_scene import sub_scene
 from certifier.verify.file import read_file
 from certifier.verify.map import verify_map
 
-FORMAT = 1
+FORMAT = 2
 """Version of the file."""
 PROVED, OPEN = -1, -2
 """These nodes of a tree are leaves."""
+HAIR = 2e-9
+"""Oblique cuts are moved back by what HAIR in each joint changes at most, radians or metres; where a joint's limits are beyond 1, HAIR is a
+part of the larger one. Lookups need half of it (ciris.free_set), and the rest is more than what they round.
+"""
 
 
 def of_file(payload: dict[str, Any]) -> dict[str, Any]:
@@ -95,7 +99,7 @@ def free_set(proof: MapProof) -> dict[str, Any]:
     clauses: dict[tuple[int, ...], list[Pair]] = {}
     for pair, numbers in about.items():
         clauses.setdefault(tuple(numbers), []).append(pair)
-    sizes = [len(joint) for joint, _, _ in trees]
+    sizes = [len(joint) for joint, *_ in trees]
     root = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     head = {
         "format": FORMAT,
@@ -104,38 +108,52 @@ def free_set(proof: MapProof) -> dict[str, Any]:
         "joints": [joint.name for joint in scene.moving],
         "clauses": [[[pair.a, pair.b] for pair in pairs] for pairs in clauses.values()],
     }
-    uppers = [np.where(joint >= 0, upper + begin, 0) for begin, (joint, _, upper) in zip(root, trees, strict=True)]
+    uppers = [np.where(joint >= 0, upper + begin, 0) for begin, (joint, _, upper, _) in zip(root, trees, strict=True)]
     return {
         "head": np.array(json.dumps(head)),
         "q_star": scene.q_star,
         "q_lower": scene.q_lower,
         "q_upper": scene.q_upper,
         "revolute": scene.revolute,
-        "joint": np.concatenate([joint for joint, _, _ in trees]),
-        "cut": np.concatenate([cut for _, cut, _ in trees]),
+        "joint": np.concatenate([joint for joint, *_ in trees]),
+        "cut": np.concatenate([cut for _, cut, *_ in trees]),
         "upper": np.concatenate(uppers).astype(np.int32),
+        "normals": np.concatenate([normals for *_, normals in trees]),
         "root": root.astype(np.int32),
         "first": np.concatenate([[0], np.cumsum([len(numbers) for numbers in clauses])]).astype(np.int32),
         "tree": np.array([number for numbers in clauses for number in numbers], np.int32),
     }
 
 
-def _tree(scene: Scene, pairs: Sequence[Pair], part: PairMap) -> tuple[np.ndarray, Array, np.ndarray]:
-    """Returns the joint, the cut in q and the upper part of each node of a tree. Parts that are alike all over become one leaf."""
-    positions, inner = sub_scene(scene, pairs).positions, part.nodes >= 0
+def _tree(scene: Scene, pairs: Sequence[Pair], part: PairMap) -> tuple[np.ndarray, Array, np.ndarray, Array]:
+    """Returns the joint, the cut in q and the upper part of each node of a tree. Parts that are alike all over become one leaf.
+
+    The place of an oblique cut is in s, a hair nearer to where the plane is than in the map. The last array has the normals.
+    """
+    positions, oblique, of_joint = sub_scene(scene, pairs).positions, part.nodes == OBLIQUE, (part.nodes >= 0) & (part.nodes != OBLIQUE)
     joints = np.where(part.nodes == PLANE, PROVED, OPEN).astype(np.int16)
-    joints[inner] = positions[part.nodes[inner]]
-    s = np.zeros((len(part.cuts), scene.n))
-    of_cuts = np.arange(len(s)), joints[inner]
-    s[of_cuts] = part.cuts
+    joints[of_joint], joints[oblique] = positions[part.nodes[of_joint]], OBLIQUE
     cuts = np.zeros(len(joints))
-    cuts[inner] = scene.to_q(s)[of_cuts]
-    return smallest(joints, cuts)
+    cuts[part.nodes >= 0] = part.cuts
+    s = np.zeros((np.count_nonzero(of_joint), scene.n))
+    of_cuts = np.arange(len(s)), joints[of_joint]
+    s[of_cuts] = cuts[of_joint]
+    cuts[of_joint] = scene.to_q(s)[of_cuts]
+    normals = np.zeros((np.count_nonzero(oblique), scene.n))
+    normals[:, positions] = part.normals
+    farthest = np.maximum(np.abs(scene.s_lower), np.abs(scene.s_upper))
+    hairs = HAIR * np.maximum(1.0, np.maximum(np.abs(scene.q_lower), np.abs(scene.q_upper)))
+    cuts[oblique] -= np.abs(normals) @ (hairs * np.where(scene.revolute, (1 + farthest**2) / 2, 1.0))
+    kept, cuts, uppers, places = smallest(joints, cuts)
+    return kept, cuts, uppers, normals[(np.cumsum(oblique) - 1)[places[kept == OBLIQUE]]]
 
 
 @njit(cache=True)
-def smallest(joint: np.ndarray, cut: Array) -> tuple[np.ndarray, Array, np.ndarray]:
-    """Returns a tree in preorder with its upper parts, without the cuts whose both parts are wholly proved, or wholly open."""
+def smallest(joint: np.ndarray, cut: Array) -> tuple[np.ndarray, Array, np.ndarray, np.ndarray]:
+    """Returns a tree in preorder with its upper parts, without the cuts whose both parts are wholly proved, or wholly open.
+
+    The last array says which of the given nodes each node is.
+    """
     N = len(joint)
     kind, size, left = joint.copy(), np.ones(N, np.int32), np.ones(N, np.int32)
     waiting, top = np.empty(N, np.int32), 0
@@ -150,12 +168,12 @@ def smallest(joint: np.ndarray, cut: Array) -> tuple[np.ndarray, Array, np.ndarr
         waiting[top] = node
         top += 1
     joints, cuts, uppers = np.empty(left[0], np.int16), np.zeros(left[0]), np.zeros(left[0], np.int32)
-    node = 0
+    node, places = 0, np.empty(left[0], np.int64)
     for at in range(left[0]):
-        joints[at] = kind[node]
+        joints[at], places[at] = kind[node], node
         if kind[node] < 0:
             node += size[node]
         else:
             cuts[at], uppers[at] = cut[node], at + 1 + left[node + 1]
             node += 1
-    return joints, cuts, uppers
+    return joints, cuts, uppers, places

@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from certifier.map.descent import Descent, in_order
-from certifier.map.pair import Found, OpenCells, PairTree
+from certifier.map.descent import Descent
+from certifier.map.pair import Found, OpenCells, PairTree, Proved
 from certifier.map.trees import Pairs, Plan
 from certifier.model import Array, Scene
 from certifier.proof import limits
 from certifier.proof.map import MapProof, PairMap
-from certifier.proof.partition import PLANE
+from certifier.proof.partition import OBLIQUE, PLANE
 
 HELD, FIRST, MOST_BATCHES = 4000, 8000, 16
 """HELD samples say what is proved; FIRST ones say where work is, at first. At most MOST_BATCHES times as many are drawn for that."""
@@ -79,33 +79,30 @@ class Tree:
     Attributes:
         cells: the open cells, with the numbers of the samples in them.
         nodes: (C,) their nodes.
-        found: the planes, choices, pieces and lengths that were found, in the order in which they were.
+        found: the planes that were found, in the order in which they were.
     """
 
     pair: PairTree
     descent: Descent
     cells: OpenCells
     nodes: Array
-    found: list[tuple[Array, Array, Array, Array]]
+    found: list[Proved]
 
     @classmethod
     def of(cls, pair: PairTree, former: PairMap | None = None) -> Tree:
         """Returns a tree without cuts, or one that goes on with a former map of the same pairs, where that has the same volumes."""
-        none = np.zeros(0, np.int8)
-        found = [(np.zeros((0, 5, 1 + pair.scene.n)), none, none, np.zeros((0, 2), np.int64))]
-        tree = cls(pair, Descent(), pair.root(np.zeros(0, np.int64)), np.zeros(1, np.int64), found)
+        k = pair.scene.n
+        tree = cls(pair, Descent(k), pair.root(np.zeros(0, np.int64)), np.zeros(1, np.int64), [Proved.nothing(k)])
         if former is not None and pair.is_of(former):
-            tree.nodes = tree.descent.add(tree.nodes, former.nodes, former.cuts)
+            tree.nodes = tree.descent.add(tree.nodes, former.nodes, former.cuts, former.normals)
             tree.cells = pair.cells(*tree.descent.boxes(*(bounds[0] for bounds in tree.cells[:2])))
-            tree.found.append((former.planes, former.choices, former.pieces, pair.lengths(former)))
+            tree.found.append(pair.proved(former))
         return tree
 
     @property
     def bytes(self) -> int:
         """Returns about how many bytes the tree has in a proof."""
-        return int(
-            9 * self.descent.size + sum(part.nbytes + pieces.nbytes + 2 * lengths[:, 1].sum() for part, _, pieces, lengths in self.found)
-        )
+        return 9 * self.descent.size + self.descent.normals.nbytes + sum(part.bytes for part in self.found)
 
     def insert(self, numbers: Array, samples: Array) -> Array:
         """Adds samples, (S, n) with these numbers, to the open cells that they lie in, and returns the numbers of those that do."""
@@ -129,11 +126,11 @@ class Tree:
 
     def take(self, nodes: Array, found: Found) -> None:
         """Puts what was found in the places of open cells; ``found`` has the numbers of samples."""
-        opened = self.descent.add(nodes, found.nodes, found.cuts)
+        opened = self.descent.add(nodes, found.nodes, found.cuts, found.normals)
         stay = np.flatnonzero(~np.isin(self.nodes, nodes))
         self.nodes = np.concatenate([self.nodes[stay], opened])
         self.cells = self.cells.some(stay).with_more(found.left)
-        self.found.append((found.planes, found.choices, found.pieces, found.lengths))
+        self.found.append(found.proved)
 
 
 class Trees:
@@ -183,10 +180,8 @@ class Trees:
         maps = []
         for pairs in worked:
             tree = self.trees[pairs]
-            nodes, cuts, held = tree.descent.in_order()
-            planes, choices, pieces, lengths = (np.concatenate(parts) for parts in zip(*tree.found, strict=True))
-            ordered = in_order(pieces, np.cumsum(lengths[:, 0]), held)
-            maps.append(tree.pair.proof(nodes, cuts, planes[held], choices[held], ordered, lengths[held]))
+            nodes, cuts, normals, held = tree.descent.in_order()
+            maps.append(tree.pair.proof(nodes, cuts, normals, Proved.together(tree.found).some(held)))
         return MapProof(self.scene, tuple(worked), tuple(maps))
 
 
@@ -231,7 +226,8 @@ class Growing(Trees):
         at = np.concatenate([at, scene.to_s(self._ways.reshape(-1, scene.n))])
         wanted = beside(scene, at[self._plan.free(at)], min(SIDES, max(1, BESIDE // max(1, len(at)))))
         sides = wanted.reshape(-1, scene.n)
-        self._add(sides[self._plan.free(sides)], DEMAND / wanted.shape[1])
+        begin = len(self._samples)
+        self._wanted = slice(begin, begin + self._add(sides[self._plan.free(sides)], DEMAND / wanted.shape[1]))
         self._bytes = sum(tree.bytes for tree in self.trees.values())
 
     @property
@@ -242,6 +238,13 @@ class Growing(Trees):
             return Coverage(0.0, 1.0)
         share = float((held == 0).mean())
         return Coverage(share, float(np.sqrt(max(share * (1 - share), 1 / len(held)) / len(held))))
+
+    @property
+    def wants(self) -> bool:
+        """Returns whether a configuration that was asked for is in an open cell that is looked at still."""
+        asked = np.zeros(len(self._samples))
+        asked[self._wanted] = self._open[self._wanted] > 0
+        return bool(asked.any()) and any(tree.weights(asked).any() for tree in self.trees.values())
 
     @property
     def full(self) -> bool:
@@ -278,7 +281,7 @@ class Growing(Trees):
         tree.take(task.nodes, found._replace(left=left))
         self.looked += found.looked
         self.refused += found.looked == 0
-        self._bytes += found.planes.nbytes + found.pieces.nbytes + 9 * len(found.nodes) + 2 * int(found.lengths[:, 1].sum())
+        self._bytes += found.bytes
 
     def _task(self, name: Pairs, rows: Array, of_samples: Array, water: float) -> Task:
         tree = self.trees[name]
@@ -338,7 +341,7 @@ class Growing(Trees):
         for tree, (first, last) in zip(trees, pairwise(sizes), strict=True):
             mine = (first <= drawn) & (drawn < last)
             kinds, cuts = tree.descent.kinds[drawn[mine] - first], tree.descent.values[drawn[mine] - first]
-            inner = kinds >= 0
+            inner = (kinds >= 0) & (kinds != OBLIQUE)
             joints, (begin, end) = tree.pair.positions[kinds[inner]], self._ways[which[mine][inner]].swapaxes(0, 1)
             at = np.zeros(begin.shape)
             row = np.arange(len(at))

@@ -9,9 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from certifier.map.growing import Task
-from certifier.map.pair import Found, OpenCells
+from certifier.map.pair import Found, OpenCells, Proved
 from certifier.map.trees import Pairs
 from certifier.model import Array, Scene
+
+OF_TREES = ("looked", "nodes", "cuts", "normals")
+"""These fields of certifier.map.pair.Found are arrays or numbers."""
 
 
 class Entry(NamedTuple):
@@ -45,8 +48,8 @@ def unpack_tasks(scene: Scene, data: bytes) -> list[Task]:
 
 def pack_entries(scene: Scene, entries: Sequence[Entry]) -> bytes:
     """Returns what was found for tasks as bytes."""
-    fields = [field for field in Found._fields if field != "left"]
-    return _bytes(({**_named(scene, one), **_cells(one.found.left)} for one in entries), fields, [one.found for one in entries], small=True)
+    parts = ({**_named(scene, one), **_cells(one.found.left), **one.found.proved._asdict()} for one in entries)
+    return _bytes(parts, OF_TREES, [one.found for one in entries], small=True)
 
 
 def unpack_entries(scene: Scene, data: bytes) -> list[Entry]:
@@ -55,8 +58,8 @@ def unpack_entries(scene: Scene, data: bytes) -> list[Entry]:
 
 
 def _found(one: dict[str, Array]) -> Found:
-    streams = (one[field] for field in Found._fields if field not in ("looked", "left"))
-    return Found._make([int(one["looked"]), *streams, _open_cells(one)])
+    proved = Proved(*(one[field] for field in Proved._fields))
+    return Found(int(one["looked"]), one["nodes"], one["cuts"], one["normals"], proved, _open_cells(one))
 
 
 def _named(scene: Scene, one: Task | Entry) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from certifier.partition.together import volumes_of
 from certifier.partition.tree import ALL
 from certifier.proof.ground import Ground
 from certifier.proof.map import PairMap
-from certifier.proof.partition import OPEN, PLANE, STREAMS, choices_of
+from certifier.proof.partition import OBLIQUE, OPEN, PLANE, STREAMS, choices_of
 from certifier.proof.sub_scene import sub_scene
 from certifier.verify.partition import PartitionCheck
 
@@ -44,6 +44,7 @@ class OpenCells(NamedTuple):
         lower, upper: (C, k) their bounds.
         level: (C,) how many levels, the finest ones, are to be tried.
         contacts, known: (C, CONTACTS, k), (C,) configurations at which the volumes of this level touch.
+        waits: (C,) as certifier.map.engine.Work has it.
         samples: (C + 1,) where the numbers of a cell's samples begin in ``numbers``.
         numbers: the numbers of samples.
     """
@@ -53,22 +54,22 @@ class OpenCells(NamedTuple):
     level: Array
     contacts: Array
     known: Array
+    waits: Array
     samples: Array
     numbers: Array
 
     def some(self, which: Array) -> OpenCells:
         """Returns some of the cells."""
         begin, places = _ranges(self.samples[which], self.samples[which + 1])
-        return self.of([array[which] for array in self[:5]], begin, self.numbers[places])
+        return self.of([array[which] for array in self[:6]], begin, self.numbers[places])
 
     @classmethod
     def of(cls, of_cells: Sequence[Array], samples: Array, numbers: Array) -> OpenCells:
-        lower, upper, level, contacts, known = of_cells
-        return cls(lower, upper, level, contacts, known, samples, numbers)
+        return cls._make([*of_cells, samples, numbers])
 
     def with_more(self, others: OpenCells) -> OpenCells:
         """Returns these cells and then others."""
-        parts = [np.concatenate(both) for both in zip(self[:5], others[:5], strict=True)]
+        parts = [np.concatenate(both) for both in zip(self[:6], others[:6], strict=True)]
         samples = np.concatenate([self.samples, self.samples[-1] + others.samples[1:]])
         return self.of(parts, samples, np.concatenate([self.numbers, others.numbers]))
 
@@ -80,40 +81,78 @@ def _ranges(first: Array, last: Array) -> tuple[Array, Array]:
     return begin, np.repeat(first - begin[:-1], lengths) + np.arange(begin[-1])
 
 
+class Proved(NamedTuple):
+    """Planes with their proofs.
+
+    Attributes:
+        planes, choices, pieces, counts, multipliers: as a proof holds them.
+        lengths: (planes, 3) how many nodes of pieces, pieces, and multipliers each plane has.
+    """
+
+    planes: Array
+    choices: Array
+    pieces: Array
+    counts: Array
+    multipliers: Array
+    lengths: Array
+
+    @classmethod
+    def nothing(cls, k: int) -> Proved:
+        """Returns no planes of k joints."""
+        none = np.zeros(0, np.int8)
+        return cls(np.zeros((0, 5, 1 + k)), none, none, none.astype(np.int16), none.astype(np.float32), np.zeros((0, 3), np.int64))
+
+    @classmethod
+    def together(cls, parts: Sequence[Proved]) -> Proved:
+        """Returns the planes of all parts."""
+        return cls(*map(np.concatenate, zip(*parts, strict=True)))
+
+    def some(self, which: Array) -> Proved:
+        """Returns some of the planes, in this order."""
+        ends = np.cumsum(self.lengths, axis=0)
+        several = (in_order(array, ends[:, i].copy(), which) for i, array in enumerate((self.pieces, self.counts, self.multipliers)))
+        return Proved._make([self.planes[which], self.choices[which], *several, self.lengths[which]])
+
+    @property
+    def bytes(self) -> int:
+        """Returns how many bytes they have in a proof."""
+        return sum(array.nbytes for array in self[:-1])
+
+
 class Found(NamedTuple):
     """What a piece of work leaves of the cells that it was given.
 
     Attributes:
         looked: how many cells were looked at.
-        nodes, cuts, planes, choices, pieces: a tree for each cell, one after the other, as a proof holds them.
-        lengths: (planes, 2) how many nodes of pieces, and how many pieces, each plane has.
+        nodes, cuts, normals: a tree for each cell, one after the other, as a proof holds them.
+        proved: the planes, in the order of the nodes.
         left: the open cells, in the order of the nodes.
     """
 
     looked: int
     nodes: Array
     cuts: Array
-    planes: Array
-    choices: Array
-    pieces: Array
-    lengths: Array
+    normals: Array
+    proved: Proved
     left: OpenCells
 
     @classmethod
     def of_none(cls, k: int) -> Found:
         """Returns what is found of no cells, of k joints."""
-        none = np.zeros((0, k))
-        return cls.nothing(
-            OpenCells(none, none, none[:, 0], np.zeros((0, CONTACTS, k)), none[:, 0], np.zeros(1, np.int64), np.zeros(0, np.int64))
-        )
+        bounds, none = np.zeros((0, k)), np.zeros(0, np.int64)
+        return cls.nothing(OpenCells(bounds, bounds, none, np.zeros((0, CONTACTS, k)), none, none, np.zeros(1, np.int64), none))
 
     @classmethod
     def nothing(cls, given: OpenCells) -> Found:
         """Returns the cells as they were, but that they are not looked at any more."""
         C, k = given.lower.shape
-        none = np.zeros(0, np.int8)
         left = given._replace(level=np.zeros(C, np.int64))
-        return cls(0, np.full(C, OPEN, np.int8), np.zeros(0), np.zeros((0, 5, 1 + k)), none, none, np.zeros((0, 2), np.int64), left)
+        return cls(0, np.full(C, OPEN, np.int8), np.zeros(0), np.zeros((0, k)), Proved.nothing(k), left)
+
+    @property
+    def bytes(self) -> int:
+        """Returns about how many bytes it has in a proof."""
+        return int(9 * len(self.nodes) + self.normals.nbytes + self.proved.bytes)
 
 
 class PairTree:
@@ -151,19 +190,19 @@ class PairTree:
         """Returns open cells with these bounds, (C, k) each, of which nothing is known, without samples."""
         C, k = lower.shape
         none = np.zeros(C, np.int64)
-        return OpenCells(lower, upper, none + ALL, np.zeros((C, CONTACTS, k)), none, np.zeros(C + 1, np.int64), none[:0])
+        return OpenCells(lower, upper, none + ALL, np.zeros((C, CONTACTS, k)), none, none, np.zeros(C + 1, np.int64), none[:0])
 
     def is_of(self, former: PairMap) -> bool:
         """Says whether a map is about the very volumes and frame of this tree, so that the tree may go on with it."""
-        none = {name: getattr(former, name)[:0] for name in STREAMS}
-        lengths = np.zeros((0, 2), np.int64)
-        ours = self.proof(none["nodes"], none["cuts"], none["planes"], none["choices"], none["pieces"], lengths)
+        none = {name: getattr(former, name)[:0] for name in (*STREAMS, "normals")}
+        ours = self.proof(none["nodes"], none["cuts"], none["normals"], Proved.nothing(self.scene.n))
         return replace(former, **none).to_bytes() == ours.to_bytes()
 
-    def lengths(self, former: PairMap) -> Array:
-        """Returns how many nodes of pieces, and how many pieces, each plane of a map of this tree has, (P, 2)."""
+    def proved(self, former: PairMap) -> Proved:
+        """Returns the planes of a map of this tree."""
         vertices = np.array([sum(len(volume.vertices) for volume in chosen) for chosen in former.chosen])
-        return lengths_of(former.pieces, vertices[former.choices])
+        lengths = lengths_of(former.pieces, former.counts, vertices[former.choices])
+        return Proved(former.planes, former.choices, former.pieces, former.counts, former.multipliers, lengths)
 
     def advance(self, given: OpenCells, samples: Array, weights: Array, most: int, water: float) -> Found:
         """Works on open cells until ``most`` were looked at, or none has samples of more weight than ``water``.
@@ -172,22 +211,25 @@ class PairTree:
             samples, weights: (S, k), (S,), in the coordinates of the tree's joints; ``given`` has their numbers.
         """
         C, k = given.lower.shape
-        work = engine.empty(C + 2 * most, k)
-        work.lower[:C], work.upper[:C], work.level[:C], work.contacts[:C], work.known[:C] = given[:5]
+        work = engine.empty(C, most, k)
+        for array, of_cells in zip((work.lower, work.upper, work.level, work.contacts, work.known, work.waits), given[:6], strict=True):
+            array[:C] = of_cells
         work.begin[:C], work.end[:C] = given.samples[:-1], given.samples[1:]
         order = given.numbers.copy()
-        size, looked, kept, pieces = engine.advance(self._pairs, self._levels, work, C, order, samples, weights, most, water)
+        size, looked, kept, streams = engine.advance(self._pairs, self._levels, work, C, order, samples, weights, most, water)
         nodes, cuts, numbers = preorder(work.kinds, work.values, work.children, size, C)
         opened, by_place = numbers[nodes == OPEN], work.plane[numbers[nodes == PLANE]]
         begin, places = _ranges(work.begin[opened], work.end[opened])
-        of_cells = (work.lower, work.upper, work.level, work.contacts, work.known)
-        left = OpenCells.of([array[opened] for array in of_cells], begin, order[places])
-        ordered, lengths = in_order(pieces, np.ascontiguousarray(kept.bounds[1:, 0]), by_place), np.diff(kept.bounds, axis=0)
-        return Found(looked, nodes, cuts, kept.planes[by_place], kept.choices[by_place], ordered, lengths[by_place], left)
+        of_open = (work.lower, work.upper, work.level, work.contacts, work.known, work.waits)
+        left = OpenCells.of([array[opened] for array in of_open], begin, order[places])
+        held = kept.held[0]
+        lengths = np.diff(kept.bounds[: held + 1], axis=0)
+        proved = Proved._make([kept.planes[:held], kept.choices[:held], *streams, lengths]).some(by_place)
+        return Found(looked, nodes, cuts, work.normals[work.plane[numbers[nodes == OBLIQUE]]], proved, left)
 
     def verified(self, given: OpenCells, found: Found) -> Found:
         """Returns what a piece of work has found if the verifier accepts it. Else its cells stay open, and are not looked at any more."""
-        proof = self.proof(found.nodes, found.cuts, found.planes, found.choices, found.pieces, found.lengths)
+        proof = self.proof(found.nodes, found.cuts, found.normals, found.proved)
         try:
             check = self._check.prepared(proof, list(zip(given.lower, given.upper, strict=True)))
             for cells in check.cells(TOGETHER):
@@ -196,12 +238,11 @@ class PairTree:
             return Found.nothing(given)
         return found
 
-    def proof(self, nodes: Array, cuts: Array, planes: Array, choices: Array, pieces: Array, lengths: Array) -> PairMap:
+    def proof(self, nodes: Array, cuts: Array, normals: Array, proved: Proved) -> PairMap:
         """Returns the map that trees of this pair are (:class:`Found` says what the arguments are)."""
-        area, none = self._area, np.zeros(0)
-        counts = np.zeros(int(lengths[:, 1].sum()), np.int16)
-        arrays = (nodes, cuts, planes, choices, pieces, counts, none.astype(np.int16), none.astype(np.float32))
-        return PairMap(self.scene, self._volumes, self._frame, area.ground, area.center, self._coarse, *arrays)
+        planes, choices, pieces, counts, multipliers, _ = proved
+        arrays = (nodes, cuts, planes, choices, pieces, counts, np.zeros(0, np.int16), multipliers, normals)
+        return PairMap(self.scene, self._volumes, self._frame, self._area.ground, self._area.center, self._coarse, *arrays)
 
 
 def limits_of(scene: Scene) -> Area:

@@ -12,13 +12,14 @@ from certifier.partition import planes
 from certifier.partition.bodies import CALM, DESCENT, ENOUGH, LEAST, LOOKS, Pair, in_s, prove_both
 from certifier.partition.hulls import gaps
 from certifier.partition.multipliers import PROVED
-from certifier.partition.search import NARROW
 from certifier.partition.sides import Proofs
 
 LEVELS = 4
 """A tree has at most this many levels."""
 CONTACTS = 8
 """A cell remembers at most this many configurations at which its volumes touch."""
+NARROW = np.radians(0.1)
+"""A cell that turns less than this in every joint is not cut any more."""
 CORNERS, OTHERS, MORE = 64, 24, 120
 """CORNERS corners of a cell are looked at, and OTHERS other configurations on its boundary; up to MORE may join them."""
 _SPREAD = np.random.default_rng(0).random((OTHERS, 64))

@@ -153,7 +153,7 @@ class Bodies:
         """
         if self._known is not None:
             return self._prove(cell, start, self._known)
-        kind, plane, proofs, first, X, places, weights = _separate(
+        kind, plane, proofs, first, X, places, weights = separated(
             self.pair, cell.lower, cell.upper, *self._inside(cell), start, cell.points, cell.seed, LEAST / self._area.finer
         )
         if kind == SEPARATED:
@@ -230,7 +230,7 @@ class Bodies:
 
 
 SEPARATED, NO_PLANE, UNPROVED = 2, 1, 0
-"""What :func:`_separate` finds: a plane and its proof, that there is none, or none that is proved. Where a plane took too many pieces,
+"""What :func:`separated` finds: a plane and its proof, that there is none, or none that is proved. Where a plane took too many pieces,
 -1 - j says in which joint j most of them were halved."""
 
 
@@ -244,7 +244,7 @@ def _streams(proofs: Proofs, first: Array) -> tuple[Streams, Streams]:
 
 
 @njit(cache=True)
-def _separate(
+def separated(
     pair: Pair,
     lower: Array,
     upper: Array,
@@ -297,7 +297,7 @@ def _separate(
 def _held_by(
     pair: Pair, lower: Array, upper: Array, cutting: Array, offsets: Array, faces: Array, plane: Array
 ) -> tuple[int, Array, Proofs, Array, Array]:
-    """Proves a plane (4, 1 + k) as a proof holds it on the polytope and a cell. The arguments are those of :func:`_separate`.
+    """Proves a plane (4, 1 + k) as a proof holds it on the polytope and a cell. The arguments are those of :func:`separated`.
 
     Returns:
         What :func:`prove_both` finds, the plane with a bound of its normal's length, the proofs of both sides, the lengths of the first

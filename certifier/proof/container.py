@@ -273,6 +273,10 @@ class Arrays:
         """
         return self.take(name, "float64")
 
+    def has(self, name: str) -> bool:
+        """Says whether there is an array of this name that has not been read yet."""
+        return name in self._left
+
     def end(self) -> None:
         """Raises ProofError, proof_malformed, if the file has more arrays than were read."""
         if self._left:

@@ -12,16 +12,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from certifier.document import Node
 from certifier.errors import ProofError
-from certifier.model import Pair, Scene
+from certifier.model import Array, Pair, Scene, Volume
 from certifier.proof import limits
 from certifier.proof.container import FORMAT, Arrays, head, malformed, pack, unpack, unpacked_size
-from certifier.proof.partition import OPEN, PLANE, PartitionProof
+from certifier.proof.partition import OBLIQUE, OPEN, PLANE, PartitionProof
+from certifier.proof.separation import Common
 from certifier.proof.sub_scene import sub_scene, way
 
 
@@ -29,11 +30,34 @@ from certifier.proof.sub_scene import sub_scene, way
 class PairMap(PartitionProof):
     """Holds the cells in which two volumes are proved apart, and those that are open.
 
-    It is about a scene whose joints are those between the volumes (certifier.proof.sub_scene). The nodes of the tree of cuts may be OPEN.
+    It is about a scene whose joints are those between the volumes (certifier.proof.sub_scene). The nodes of the tree of cuts may be OPEN
+    or OBLIQUE. The lower part of an oblique cut is {s in the cell: normal . s <= v}, with v its place in ``cuts``, and is a leaf with a
+    plane. Its multipliers are of this face, so ``faces`` is empty. The upper part is a tree for the whole cell, with the lower part.
+
+    Attributes:
+        normals: (O, n) of the oblique cuts, in the order of the nodes.
     """
 
     KIND: ClassVar[str] = "cells"
-    LEAVES: ClassVar[tuple[int, ...]] = (PLANE, OPEN)
+    NODES: ClassVar[tuple[int, ...]] = (PLANE, OPEN, OBLIQUE)
+
+    normals: Array
+
+    def own(self, number: Callable[[Volume], int]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+        header, arrays = super().own(number)
+        return header, arrays | {"normals": self.normals}
+
+    @classmethod
+    def read(cls, common: Common, header: dict[str, Node], volumes: Sequence[Volume], arrays: Arrays, prefix: str) -> Self:
+        part = PartitionProof.read(common, header, volumes, arrays, prefix)
+        name = f"{prefix}/normals"
+        normals = arrays.floats(name) if arrays.has(name) else np.zeros((0, common.scene.n))  # maps of before had no oblique cuts
+        return cls(**vars(part), normals=normals)
+
+    @property
+    def offsets(self) -> Array:
+        """Returns v of each oblique cut, (O,)."""
+        return self.cuts[self.nodes[self.nodes >= 0] == OBLIQUE]
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,8 @@ EMPTY = -2
 """The cell of this node, or its piece (z0 = 0), misses the polytope."""
 OPEN = -3
 """The cell of this node is open: nothing is proved about it. Outlines and maps have such nodes."""
+OBLIQUE = 127
+"""The cell of this node is cut by a face, a half-space of s, in place of a joint. Maps have such nodes (certifier.proof.map)."""
 
 STREAMS = {
     "nodes": "int8",
@@ -83,7 +85,7 @@ class PartitionProof(Separation):
     """
 
     KIND: ClassVar[str] = "partition"
-    LEAVES: ClassVar[tuple[int, ...]] = (PLANE, EMPTY)
+    NODES: ClassVar[tuple[int, ...]] = (PLANE, EMPTY)
     HEADER: ClassVar[tuple[str, ...]] = ("coarse",)
 
     coarse: Coarse

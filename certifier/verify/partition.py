@@ -14,6 +14,9 @@ at the corners, where what is computed is rounded in the same manner. A leaf wit
 The volumes of a cell are the two of the proof, or coarse ones in their places, which contain the same geometries there at all angles of the
 joints that they leave out (certifier.verify.coarse).
 
+The lower part of an oblique cut of a map is such a cell, too, with the cut as its face: P is the half-space there. The upper part is
+checked as if the cell had not been cut.
+
 If F(alpha) >= t D(alpha) for all alpha and t >= 0, the same argument gives f >= t on the piece. The volumes are (t_A + t_B)/max |a| apart
 then.
 """
@@ -121,7 +124,7 @@ class CellCheck:
         self._cuts = Cuts(proof, self._play, len(roots))
         self._roots = [(lower[self._play], upper[self._play]) for lower, upper in roots]
         self._pieces = Pieces(proof, len(self._play))
-        self._multipliers = Multipliers(proof, ground)
+        self._multipliers = Multipliers(proof, ground, self._pieces)
 
         # Volumes that no cell chooses cost nothing here, however many vertices a stranger gives them.
         padding = scene.padding_between(proof.volumes)

@@ -11,7 +11,8 @@ from certifier.errors import ProofError
 from certifier.model import Array
 from certifier.proof import limits
 from certifier.proof.ground import Ground
-from certifier.proof.partition import EMPTY, OPEN, PLANE, STREAMS, PartitionProof
+from certifier.proof.map import PairMap
+from certifier.proof.partition import EMPTY, OBLIQUE, OPEN, PLANE, STREAMS, PartitionProof
 
 _MULTIPLIED = 1 << 16
 """About this many multipliers are added up at once."""
@@ -60,7 +61,7 @@ class Cuts:
         nodes = proof.nodes
         if len(nodes) > limits.NODES:
             raise ProofError("proof_too_large", f"{proof.title}: {len(nodes)} nodes; at most {limits.NODES} are checked")
-        if not np.isin(nodes, [*proof.LEAVES, *play]).all():
+        if not np.isin(nodes, [*proof.NODES, *play]).all():
             raise malformed(proof, "a node cuts a joint that does not move one of the bodies in the frame, or is of no kind")
         ends = _ends(nodes)
         if len(ends) != trees or ends[-1] != len(nodes):
@@ -71,6 +72,13 @@ class Cuts:
             raise malformed(proof, f"the planes are {proof.planes.shape}")
         if not (np.isfinite(proof.cuts).all() and np.isfinite(proof.planes).all()):
             raise malformed(proof, "a cut or a plane is not finite")
+        oblique = np.flatnonzero(nodes == OBLIQUE)
+        if isinstance(proof, PairMap) and proof.normals.shape != (len(oblique), proof.scene.n):
+            raise malformed(proof, f"the normals of {len(oblique)} oblique cuts are {proof.normals.shape}")
+        if isinstance(proof, PairMap) and not np.isfinite(proof.normals).all():
+            raise malformed(proof, "the normal of an oblique cut is not finite")
+        if not (nodes[oblique + 1] == PLANE).all():
+            raise malformed(proof, "the lower part of an oblique cut is no cell with a plane")
         self._proof, self._play = proof, play
 
     def cells(self, roots: Sequence[tuple[Array, Array]], most: int) -> Iterator[Cells]:
@@ -88,12 +96,18 @@ class Cuts:
         number = 0
         for node in proof.nodes.tobytes():
             depth, lower, upper = pending.pop()
+            if node == OBLIQUE:  # both parts are taken to be the whole cell; the multipliers of the lower one are of the cut
+                if depth == limits.CUT_DEPTH:
+                    raise self._too_deep()
+                pending += [(depth + 1, lower, upper)] * 2
+                next(cuts)
+                continue
             if node < 128:  # an int8 that is not negative
                 i, cut = column[node], next(cuts)
                 if not lower[i] < cut < upper[i]:
                     raise malformed(proof, f"joint {node} is cut at {cut:g}, outside of the cell from {lower[i]:g} to {upper[i]:g}")
                 if depth == limits.CUT_DEPTH:
-                    raise ProofError("proof_too_large", f"{proof.title}: a cell is cut more than {limits.CUT_DEPTH} times")
+                    raise self._too_deep()
                 middle_upper, middle_lower = upper.copy(), lower.copy()
                 middle_upper[i] = middle_lower[i] = cut
                 pending += [(depth + 1, middle_lower, upper), (depth + 1, lower, middle_upper)]
@@ -108,6 +122,9 @@ class Cuts:
                 found = []
         if found:
             yield _together(found)
+
+    def _too_deep(self) -> ProofError:
+        return ProofError("proof_too_large", f"{self._proof.title}: a cell is cut more than {limits.CUT_DEPTH} times")
 
 
 def _together(found: list[tuple[int, int, bool, Array, Array]]) -> Cells:
@@ -211,27 +228,49 @@ class Sums:
 class Multipliers:
     """Holds the multipliers of a proof, of its pieces and of its EMPTY nodes, which are checked to be nonnegative and of faces there are.
 
+    Args:
+        pieces: those of the proof.
+
     Raises:
         ProofError: they are not.
     """
 
-    def __init__(self, proof: PartitionProof, ground: Ground) -> None:
+    def __init__(self, proof: PartitionProof, ground: Ground, pieces: Pieces) -> None:
         counts = proof.counts
         wanted = np.count_nonzero(proof.nodes == EMPTY) + np.count_nonzero(proof.pieces < 0)
         if len(counts) != wanted or (counts.size and not (counts.min() >= 0 and counts.max() <= limits.FACES)):
             raise malformed(proof, f"{len(counts)} counts of multipliers, for {wanted} pieces, or one that is none")
         total = int(counts.sum(dtype=np.int64))
-        if not len(proof.faces) == len(proof.multipliers) == total:
-            raise malformed(proof, f"{len(proof.faces)} faces and {len(proof.multipliers)} multipliers where {total} belong")
-        if total and not (proof.faces.min() >= 0 and proof.faces.max() < len(ground.d)):
-            raise malformed(proof, f"a multiplier is of a face that is not there; there are {len(ground.d)}")
+        self._start = np.cumsum(counts, dtype=np.int64) - counts
+        if isinstance(proof, PairMap):
+            self._C, self._d, self._faces = proof.normals, proof.offsets, self._of_oblique_cuts(proof, pieces, total)
+        else:
+            self._C, self._d, self._faces = ground.C, ground.d, proof.faces
+        if not len(self._faces) == len(proof.multipliers) == total:
+            raise malformed(proof, f"{len(self._faces)} faces and {len(proof.multipliers)} multipliers where {total} belong")
+        if total and not (self._faces.min() >= 0 and self._faces.max() < len(self._d)):
+            raise malformed(proof, f"a multiplier is of a face that is not there; there are {len(self._d)}")
         if total and not (proof.multipliers.min() >= 0 and np.isfinite(proof.multipliers).all()):
             raise malformed(proof, "a multiplier is negative or not finite")
-        self._proof, self._ground = proof, ground
-        self._counts, self._start = counts, np.cumsum(counts, dtype=np.int64) - counts
+        self._proof, self._counts = proof, counts
         # EMPTY nodes and planes share the stream of counts, in the order of the nodes.
         leaves = proof.nodes[proof.nodes < 0]
         self._empty_before = np.cumsum(leaves == EMPTY, dtype=np.int32) - (leaves == EMPTY)
+
+    def _of_oblique_cuts(self, proof: PairMap, pieces: Pieces, total: int) -> np.ndarray:
+        """Returns the face of each multiplier of a map: the cut of which its cell is the lower part.
+
+        Raises:
+            ProofError: a cell that is none has multipliers, or the proof names faces of its own.
+        """
+        if len(proof.faces):
+            raise malformed(proof, "a map names the faces of multipliers")
+        lower = np.concatenate([[False], proof.nodes[:-1] == OBLIQUE])[proof.nodes == PLANE]
+        ends = np.append(self._start, total)
+        many = np.diff(np.append(ends[pieces.before(np.arange(len(lower)))], total))
+        if many[~lower].any():
+            raise malformed(proof, "a cell that is no part of an oblique cut has multipliers")
+        return np.repeat(np.cumsum(lower) - 1, many)
 
     def count(self, number: np.ndarray, rank: np.ndarray) -> np.ndarray:
         """Returns how many multipliers pieces of leaves have, (...), given as in :meth:`of_pieces`."""
@@ -246,7 +285,7 @@ class Multipliers:
         return self._sums(rank + self._empty_before[number])
 
     def _sums(self, at: np.ndarray) -> Sums:
-        flat, C, d = at.reshape(-1), self._ground.C, self._ground.d
+        flat, C, d = at.reshape(-1), self._C, self._d
         count = self._counts[flat].astype(np.int64)
         sums: Array = np.zeros((len(flat), C.shape[1] + 1))
         sizes = np.zeros_like(sums)
@@ -255,7 +294,7 @@ class Multipliers:
         for part in np.split(some, np.flatnonzero(np.diff(end[some] // _MULTIPLIED)) + 1) if some.size else ():
             first = end[part] - count[part]
             index = np.repeat(self._start[flat[part]] - (first - first[0]), count[part]) + np.arange(count[part].sum())
-            face, weight = self._proof.faces[index], self._proof.multipliers[index].astype(float)[:, None]
+            face, weight = self._faces[index], self._proof.multipliers[index].astype(float)[:, None]
             terms = weight * np.column_stack([C[face], d[face]])
             sums[part] = np.add.reduceat(terms, first - first[0], axis=0)
             sizes[part] = np.add.reduceat(np.abs(terms), first - first[0], axis=0)

@@ -20,9 +20,9 @@ import ciris.free_set
 from benchmarks.lookups import enlarged
 from certifier.errors import CirisError, RegionError
 from certifier.map import free_set
-from certifier.proof import limits
+from certifier.proof import limits, partition
 from ciris import FreeSet, lookups
-from tests.free_sets import LIMIT, OPEN, PROVED, N, written
+from tests.free_sets import LIMIT, OBLIQUE, OPEN, PROVED, N, written
 
 Leaf = tuple[list[Any], list[Any], bool]
 
@@ -208,6 +208,96 @@ def test_a_motion_may_cross_many_cells(tmp_path: Path) -> None:
         assert sum(part.end - part.start for part in parts) == pytest.approx(100 * (cuts[1] - cuts[0]) / 4, abs=1e-6)
 
 
+normals = st.lists(st.integers(-4, 4).map(lambda k: k / 4), min_size=N, max_size=N).filter(any)
+oblique_trees = st.recursive(
+    st.sampled_from([PROVED, OPEN, OPEN]),
+    lambda parts: st.one_of(
+        st.tuples(st.integers(0, N - 1), st.integers(-7, 7).map(lambda k: k / 4), parts, parts),
+        st.tuples(st.just(OBLIQUE), st.integers(-8, 8).map(lambda k: k / 8), st.just(PROVED), parts, normals),
+    ),
+    max_leaves=10,
+)
+
+
+def room_in(tree: Any, q: np.ndarray, s: np.ndarray, box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How deep configurations (k, N) are in a proved part of a tree, and in an open one; below 0 outside. Depths are those of q or s."""
+    deep = np.minimum((q - box[0]).min(axis=1), (box[1] - q).min(axis=1))
+    if isinstance(tree, int):
+        nowhere = np.full(len(q), -np.inf)
+        return (deep, nowhere) if tree == PROVED else (nowhere, deep)
+    joint, cut, low, high, *normal = tree
+    if normal:
+        before = cut - s @ np.array(normal[0])
+        proved, open_ = room_in(high, q, s, box)
+        return np.maximum(proved, np.minimum(deep, before)), np.minimum(open_, -before)
+    middle = box[0, joint] < cut < box[1, joint]
+    below, above = box.copy(), box.copy()
+    below[1, joint] = above[0, joint] = cut
+    parts = [room_in(part, q, s, part_box) for part, part_box in ((low, below), (high, above))] if middle else []
+    if not middle:
+        return room_in(low, q, s, box)
+    return np.maximum(*(part[0] for part in parts)), np.maximum(*(part[1] for part in parts))
+
+
+def inside_limits(tree: Any, box: np.ndarray) -> Any:
+    """The tree without the cuts in joints that miss their cells."""
+    if isinstance(tree, int):
+        return tree
+    joint, cut, low, high, *normal = tree
+    if normal:
+        return joint, cut, low, inside_limits(high, box), *normal
+    if not box[0, joint] < cut < box[1, joint]:
+        return inside_limits(low, box)
+    below, above = box.copy(), box.copy()
+    below[1, joint] = above[0, joint] = cut
+    return joint, cut, inside_limits(low, below), inside_limits(high, above)
+
+
+@settings(deadline=None, max_examples=200)
+@given(oblique_trees, st.lists(st.tuples(grids(15), grids(15)), min_size=1, max_size=4), st.lists(st.booleans(), min_size=N, max_size=N))
+def test_oblique_cuts_are_half_spaces_of_s(tmp_path_factory, drawn, motions, revolute) -> None:
+    """Of a motion, as many configurations are looked at as its answer leaves no room for."""
+    box = np.array([[-LIMIT] * N, [LIMIT] * N])
+    tree = inside_limits(drawn, box)
+    found = FreeSet.load(written(tmp_path_factory.mktemp("free") / "cell.npz", [[tree]], revolute=np.array(revolute)))
+    t = np.linspace(0.0, 1.0, 401)[:, None]
+    for start, end in np.array(motions):
+        q = start + t * (end - start)
+        proved, open_ = room_in(tree, q, found.to_s(q), box)
+        holds = found.contains(q)
+        assert not (holds & (open_ > 1e-6) & (proved < -1e-6)).any()
+        assert holds[proved > 1e-6].all()
+        along = found.contains_motion(start, end)
+        assert holds.all() or not along
+        parts = found.proved_parts(start, end)
+        for first, last in parts:
+            assert (proved[(t[:, 0] > first) & (t[:, 0] < last)] > -1e-6).all()
+        reach = np.zeros(len(t), bool)
+        for first, last in parts:
+            reach |= (t[:, 0] >= first - 1e-4) & (t[:, 0] <= last + 1e-4)
+        assert along == (parts.tolist() == [[0.0, 1.0]])
+        # One oblique cut is passed at most twice; what lies between three ranges may be left out (ciris.lookups).
+        if not (np.diff((proved > 0).astype(int)) != 0).sum() > 2:
+            assert reach[proved > 1e-2].all()
+
+
+def test_what_an_oblique_cut_proves_is_nearer(tmp_path: Path) -> None:
+    """Where nothing but the half-space before a face is proved, the answer is a part of a whole cell, moved up to the face."""
+    tree = (0, -1.5, PROVED, (OBLIQUE, 0.0, PROVED, OPEN, [1.0, 0.0, 0.0]))
+    found = FreeSet.load(written(tmp_path / "cell.npz", [[tree]]))
+    closest = found.nearest([0.5, 0.0, 0.0])
+    assert found.contains(closest.q)
+    assert closest.q == pytest.approx([0.0, 0.0, 0.0], abs=1e-4)
+    assert closest.distance == pytest.approx(np.tan(0.25), abs=1e-4)
+
+
+def test_a_file_from_before_there_were_oblique_cuts_is_read(tmp_path: Path) -> None:
+    path = written(tmp_path / "cell.npz", [[(0, 0.0, PROVED, OPEN)]], head={"format": 1})
+    with np.load(path) as arrays:
+        np.savez(path, **{name: array for name, array in arrays.items() if name != "normals"})
+    assert FreeSet.load(path).contains([[-1.0, 0, 0], [1.0, 0, 0]]).tolist() == [True, False]
+
+
 def nearest_free(cells: list[list[list[Leaf]]], found: FreeSet, q: np.ndarray) -> float:
     """The distance in s from q to the nearest cell of all trees that is free; boundaries between cells are looked at as well."""
     s, least = found.to_s(q), np.inf
@@ -343,6 +433,7 @@ def test_a_damaged_file_is_named_or_says_the_same(tmp_path_factory, at, value, s
         {"more": np.zeros(1)},
         {"head": {"joints": [1, 2, 3]}},
         {"head": {"clauses": []}},
+        {"normals": np.zeros((1, N))},
     ],
     ids=lambda changes: "-".join(changes),
 )
@@ -361,15 +452,15 @@ def test_nodes_that_two_others_share_are_no_tree(tmp_path: Path) -> None:
 
 
 def test_the_file_means_the_same_to_those_who_write_and_read_it() -> None:
-    wanted = (free_set.FORMAT, free_set.PROVED, free_set.OPEN, limits.CUT_DEPTH)
-    assert wanted == (ciris.free_set.FORMAT, lookups.PROVED, lookups.OPEN, lookups.DEPTH)
+    wanted = (free_set.FORMAT, free_set.PROVED, free_set.OPEN, partition.OBLIQUE, limits.CUT_DEPTH)
+    assert wanted == (ciris.free_set.FORMAT, lookups.PROVED, lookups.OPEN, lookups.OBLIQUE, lookups.DEPTH)
 
 
 def test_what_is_no_free_set_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text, empty = tmp_path / "text", tmp_path / "empty.npz"
     text.write_text("nothing")
     np.savez(empty, head=np.array("{}"))
-    newer = written(tmp_path / "newer.npz", [[PROVED]], head={"format": 2})
+    newer = written(tmp_path / "newer.npz", [[PROVED]], head={"format": 3})
     for path, code in ((tmp_path / "missing.npz", "no_file"), (text, "free_set"), (empty, "free_set"), (newer, "free_set")):
         with pytest.raises(CirisError) as error:
             FreeSet.load(path)

@@ -13,7 +13,7 @@ from certifier.jobs.map import grow_map
 from certifier.map.free_set import OPEN, PROVED, free_set
 from certifier.model import WORLD, JointKind
 from certifier.proof.map import MapProof
-from certifier.proof.partition import PLANE
+from certifier.proof.partition import OBLIQUE, PLANE
 from certifier.proof.sub_scene import sub_scene
 from tests.certifier.scenes import box, planar_arm, two_arms
 
@@ -25,24 +25,26 @@ def proved_by(proof: MapProof, s: np.ndarray) -> set[tuple[str, str]]:
     found = set()
     for pairs, part in zip(proof.pairs, proof.maps, strict=True):
         own = s[sub_scene(proof.scene, pairs).positions]
-        node, cut, skip = 0, 0, 0
+        node, cut, face, skip = 0, 0, 0, 0
         while skip or part.nodes[node] >= 0:
-            inner = part.nodes[node] >= 0
+            inner, oblique = part.nodes[node] >= 0, part.nodes[node] == OBLIQUE
             if skip:
                 skip += 1 if inner else -1
-            elif own[part.nodes[node]] > part.cuts[cut]:
+            elif (part.normals[face] @ own if oblique else own[part.nodes[node]]) > part.cuts[cut]:
                 skip = 1
             cut += inner
+            face += oblique
             node += 1
         if part.nodes[node] == PLANE:
             found |= {(pair.a, pair.b) for pair in pairs}
     return found
 
 
-def leaf(arrays: dict[str, np.ndarray], tree: int, q: np.ndarray) -> int:
-    node = arrays["root"][tree]
-    while arrays["joint"][node] >= 0:
-        node = arrays["upper"][node] if q[arrays["joint"][node]] > arrays["cut"][node] else node + 1
+def leaf(arrays: dict[str, np.ndarray], tree: int, q: np.ndarray, s: np.ndarray) -> int:
+    node, face = arrays["root"][tree], np.cumsum(arrays["joint"] == OBLIQUE) - 1
+    while (joint := arrays["joint"][node]) >= 0:
+        at = arrays["normals"][face[node]] @ s if joint == OBLIQUE else q[joint]
+        node = arrays["upper"][node] if at > arrays["cut"][node] else node + 1
     return int(arrays["joint"][node])
 
 
@@ -61,11 +63,12 @@ def test_each_clause_holds_where_the_trees_of_its_pairs_do(scene):
         known = proved_by(proof, scene.to_s(q))
         for number, pairs in enumerate(clauses):
             trees = arrays["tree"][arrays["first"][number] : arrays["first"][number + 1]]
-            leaves = {leaf(arrays, tree, q) for tree in trees}
+            leaves = {leaf(arrays, tree, q, scene.to_s(q)) for tree in trees}
             assert leaves <= {PROVED, OPEN}
             assert all(((a, b) in known) == (PROVED in leaves) for a, b in pairs)
             both.add(PROVED in leaves)
     assert both == {True, False}
+    assert len(arrays["normals"]) > 0
     inner = np.flatnonzero(arrays["joint"] >= 0)
     lower, upper = arrays["joint"][inner + 1], arrays["joint"][arrays["upper"][inner]]
     assert not ((lower < 0) & (lower == upper)).any()

@@ -18,7 +18,7 @@ from certifier.model import WORLD, Joint, JointKind, Pair
 from certifier.pair.collisions import in_collision
 from certifier.proof import limits
 from certifier.proof.map import MapProof, PairMap
-from certifier.proof.partition import OPEN, PLANE
+from certifier.proof.partition import OBLIQUE, OPEN, PLANE
 from certifier.proof.sub_scene import sub_scene
 from certifier.verify.map import verify_map
 from ciris.free_set import FreeSet
@@ -61,14 +61,14 @@ def inside(scene, proof: MapProof, samples):
 
 def in_planes(part: PairMap, s):
     """Which configurations (S, k) lie in a cell that has a plane."""
-    nodes, cuts, apart = iter(part.nodes.tolist()), iter(part.cuts.tolist()), np.zeros(len(s), dtype=bool)
+    nodes, cuts, normals, apart = iter(part.nodes.tolist()), iter(part.cuts.tolist()), iter(part.normals), np.zeros(len(s), dtype=bool)
 
     def walk(here):
         kind = next(nodes)
         if kind >= 0:
-            cut = next(cuts)
-            walk(here & (s[:, kind] <= cut))
-            walk(here & (s[:, kind] > cut))
+            cut, at = next(cuts), s @ next(normals) if kind == OBLIQUE else s[:, kind]
+            walk(here & (at <= cut))
+            walk(here & (at > cut))
         elif kind == PLANE:
             apart[here] = True
 
@@ -118,7 +118,7 @@ def test_a_former_map_of_the_same_scene_is_gone_on_with(grown):
 
 
 def test_a_new_obstacle_opens_its_own_pairs_alone():
-    before, post = planar_arm(3, CROWDED), box("post/box", "post", (0.1, 0.1, 0.3), (-0.9, 1.4, 0.0))
+    before, post = planar_arm(4, CROWDED), box("post/box", "post", (0.1, 0.1, 0.3), (-0.9, 1.4, 0.0))
     weld = Joint("post", JointKind.WELD, WORLD, "post", np.zeros(3), np.eye(4), np.eye(4))
     after = replace(
         before,
@@ -291,10 +291,10 @@ def test_what_the_verifier_refuses_stays_open():
     (task, *_) = growing.round()
     tree = growing.trees[task.pairs].pair
     found = tree.advance(task.given, task.samples, task.weights, 50, 0.0)
-    assert len(found.planes) > 0
+    assert len(found.proved.planes) > 0
     assert tree.verified(task.given, found) is found
-    refused = tree.verified(task.given, found._replace(planes=-found.planes))
-    assert (len(refused.planes), refused.nodes.tolist()) == (0, [OPEN])
+    refused = tree.verified(task.given, found._replace(proved=found.proved._replace(planes=-found.proved.planes)))
+    assert (len(refused.proved.planes), refused.nodes.tolist()) == (0, [OPEN])
     before = growing.coverage
     growing.take(task, refused)
     assert (growing.coverage, growing.refused) == (before, 1)

@@ -15,7 +15,7 @@ from certifier.pair.collisions import in_collision
 from certifier.proof import container, limits
 from certifier.proof.container import pack, unpack
 from certifier.proof.map import MapProof
-from certifier.proof.partition import EMPTY, OPEN, PLANE, STREAMS
+from certifier.proof.partition import EMPTY, OBLIQUE, OPEN, PLANE, STREAMS
 from certifier.proof.sub_scene import sub_scene
 from certifier.verify.file import answer
 from certifier.verify.map import verify_map
@@ -51,6 +51,11 @@ def leaf(part, kind):
     return int(np.flatnonzero(part.nodes == kind)[0])
 
 
+def of_faces(part):
+    """Which of the cuts are oblique."""
+    return part.nodes[part.nodes >= 0] == OBLIQUE
+
+
 def hand_made(proof: MapProof):
     """Forgeries, each with the code of its refusal."""
     part = proof.maps[-1]
@@ -67,6 +72,31 @@ def hand_made(proof: MapProof):
         "counts": np.concatenate([np.zeros(vertices, np.int16), part.counts]) if before == 0 else part.counts,
     }
     yield "and gets the plane of another cell", tampered(proof, -1, nodes=nodes, **more), "proof_malformed" if before else "proof_cell"
+    assert len(part.normals)
+    assert part.multipliers.any()
+    yield (
+        "oblique cuts are where the bodies touch",
+        tampered(proof, -1, cuts=np.where(of_faces(part), part.cuts + 0.1, part.cuts)),
+        "proof_cell",
+    )
+    yield "oblique cuts are the other way round", tampered(proof, -1, normals=-part.normals), "proof_cell"
+    yield "oblique cuts are in other joints", tampered(proof, -1, normals=np.roll(part.normals, 1, axis=1)), "proof_cell"
+    yield "an oblique cut has no normal", tampered(proof, -1, normals=part.normals[1:]), "proof_malformed"
+    yield (
+        "a normal is no number",
+        tampered(proof, -1, normals=np.where(np.arange(len(part.normals))[:, None], part.normals, np.nan)),
+        "proof_malformed",
+    )
+    yield "multipliers are of other faces", tampered(proof, -1, faces=np.zeros(len(part.multipliers), np.int16)), "proof_malformed"
+    yield "faces help nowhere", tampered(proof, -1, multipliers=0 * part.multipliers), "proof_cell"
+    yield "faces help the wrong way", tampered(proof, -1, multipliers=-part.multipliers), "proof_malformed"
+    yield "the face of a cell helps another one", tampered(proof, -1, counts=np.roll(part.counts, len(part.counts) // 2)), "proof_malformed"
+    nodes = part.nodes.copy()
+    nodes[np.flatnonzero(nodes == OBLIQUE)[0] + 1] = OPEN
+    yield "nothing is proved before an oblique cut", tampered(proof, -1, nodes=nodes), "proof_malformed"
+    nodes = part.nodes.copy()
+    nodes[np.flatnonzero((nodes >= 0) & (nodes != OBLIQUE))[-1]] = OBLIQUE
+    yield "a cut in a joint is called an oblique one", tampered(proof, -1, nodes=nodes), "proof_malformed"
     nodes = part.nodes.copy()
     nodes[settled] = EMPTY
     yield "a cell is said to miss the joint limits", tampered(proof, -1, nodes=nodes), "proof_malformed"
@@ -108,8 +138,11 @@ def test_a_map_without_some_pairs_says_that_nothing_is_proved_to_be_free(proof):
 
 def changed(part, rng):
     """A part with something in it changed, and what."""
-    kind = rng.choice(["number", "plane", "swap", "cut", "leaf", "choice", "piece", "bound"])
-    planes, cuts, nodes, choices, pieces = (getattr(part, name).copy() for name in ("planes", "cuts", "nodes", "choices", "pieces"))
+    kind = rng.choice(["number", "plane", "swap", "cut", "leaf", "choice", "piece", "bound", "face", "multiplier", "count"])
+    arrays = {
+        name: getattr(part, name).copy() for name in ("planes", "cuts", "nodes", "choices", "pieces", "normals", "multipliers", "counts")
+    }
+    planes, cuts, nodes, choices, pieces, normals, multipliers, counts = arrays.values()
     i = rng.integers(len(planes))
     match kind:
         case "number":
@@ -121,14 +154,20 @@ def changed(part, rng):
         case "cut":
             cuts[rng.integers(len(cuts))] += rng.normal() * 10.0 ** rng.uniform(-6, 0)
         case "leaf":
-            nodes[rng.integers(len(nodes))] = rng.choice([OPEN, PLANE, EMPTY, 0, 1, 2])
+            nodes[rng.integers(len(nodes))] = rng.choice([OPEN, PLANE, EMPTY, OBLIQUE, 0, 1, 2])
         case "choice":
             choices[i] = rng.integers(-1, 3)
         case "piece":
             pieces[rng.integers(len(pieces))] = rng.choice([PLANE, EMPTY, 0, 1])
         case "bound":
             planes[i, 4] *= rng.uniform(0.9, 1.0)
-    return kind, replace(part, planes=planes, cuts=cuts, nodes=nodes, choices=choices, pieces=pieces)
+        case "face":
+            normals[rng.integers(len(normals))] += rng.normal(size=normals.shape[1]) * 10.0 ** rng.uniform(-4, 0)
+        case "multiplier":
+            multipliers[rng.integers(len(multipliers))] *= rng.choice([0.0, 0.5, 0.99, 1.01, 2.0])
+        case "count":
+            counts[rng.integers(len(counts))] ^= 1
+    return kind, replace(part, **arrays)
 
 
 def test_what_is_accepted_of_changed_maps_is_true(proof):

@@ -267,14 +267,14 @@ FORGERIES = (
         lambda: replace(one_leaf(), faces=np.zeros(1, np.int16), multipliers=np.ones(1, np.float32)),
         "1 faces and 1 multipliers where 0 belong",
         (streams.Multipliers, "__init__"),
-        "not len(proof.faces) == len(proof.multipliers) == total",
+        "not len(self._faces) == len(proof.multipliers) == total",
     ),
     Forgery(
         "a multiplier is of a face that is there",
         a_face_from_behind,
         "a multiplier is of a face that is not there",
         (streams.Multipliers, "__init__"),
-        "proof.faces.min() >= 0",
+        "self._faces.min() >= 0",
         "True",
     ),
     Forgery(
