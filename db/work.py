@@ -31,6 +31,8 @@ MOST_KEYS = 100_000
 """The jobs of at most this many keys are compared when the next one is chosen."""
 NEW_SECONDS = 60.0
 """A job counts as new for this long after a solver has first begun a piece of it."""
+NEWEST_SECONDS = 10.0
+"""Among new jobs of a key the newest goes first, unless it was begun longer ago than this."""
 ROUNDING = 1e-9
 """Sums of fractions of batches may be too large by so much."""
 Placed = Row[tuple[str, str, str | None, float, int]]
@@ -73,21 +75,35 @@ def _sorted(found: Sequence[Placed], of_project: Counter[str], of_key: Counter[t
     return sorted(found, key=turn)
 
 
-def newcomer(session: Session) -> str | None:
+def newcomer(session: Session, *, instead_of: str | None = None) -> str | None:
     """Returns the id of the new job that gets a process beside the solvers, while they do other work; None when there is none.
 
     It is the first in the order of work among those of which no solver does anything. A step that was begun before is left to the solvers.
     A project for which more solvers work than for another one that has work gets no process: its new jobs wait for its own.
+
+    Args:
+        instead_of: the job that has this process. The process goes on to a newer job, or to one of a project or key for which fewer work.
     """
     now = utcnow()
-    since = now - timedelta(seconds=NEW_SECONDS)
-    found = session.execute(_placed(new=True), {"now": now, "since": since, "places": 1, "most": MOST_KEYS}).all()
+    times = {"now": now, "since": now - timedelta(seconds=NEW_SECONDS), "lately": now - timedelta(seconds=NEWEST_SECONDS)}
+    found = session.execute(_placed(new=True), {**times, "places": 1, "most": MOST_KEYS}).all()
     if not found:
         return None
-    of_project, _ = held = _held(session)
+    of_project, of_key = held = _held(session)
     waiting = session.execute(_placed(), {"now": now, "places": 1, "most": MOST_KEYS}).all()
     least = min(of_project[project] for project in {*of_project, *(one.project for one in waiting)})
-    return next((one.id for one in _sorted(found, *held) if of_project[one.project] <= least), None)
+    may = [one for one in _sorted(found, *held) if of_project[one.project] <= least]
+    mine = session.execute(select(JobRow.project, JobRow.key_id, JobRow.created_at).where(JobRow.id == instead_of)).one_or_none()
+    if mine is not None:
+        newer = set(session.scalars(select(JobRow.id).where(JobRow.id.in_([one.id for one in may]), JobRow.created_at > mine.created_at)))
+
+        def before(one: Placed) -> bool:
+            if one.id in newer or of_project[one.project] < of_project[mine.project]:
+                return True
+            return one.project == mine.project and of_key[one.project, one.key_id] < of_key[mine.project, mine.key_id]
+
+        may = [one for one in may if before(one)]
+    return next((one.id for one in may), None)
 
 
 def others_wait(session: Session, job_id: str) -> bool:
@@ -206,9 +222,11 @@ def _placed(new: bool = False) -> Select[tuple[str, str, str | None, float, int]
     So a job that has just started gets its first piece at once, also beside a hundred of the same key.
 
     Args:
-        new: whether only new jobs of which no solver does anything are among them, and steps that were begun before count as no work.
+        new: whether only new jobs of which no solver does anything are among them, and steps that were begun before count as no work. What
+            they were served counts only once they were begun a while ago, so that a small job goes on to its end beside others that wait.
     """
-    order = (JobRow.served, JobRow.created_at.desc(), JobRow.id)
+    served = case((JobRow.claimed_at <= bindparam("lately", type_=Utc()), JobRow.served), else_=-1.0) if new else JobRow.served
+    order = (served, JobRow.created_at.desc(), JobRow.id)
     place = func.row_number().over(partition_by=(JobRow.project, JobRow.key_id), order_by=order).label("place")
     work = and_(_is_new(), _has_work(fresh=True), ~_has_solver()) if new else _has_work()
     placed = select(JobRow.id, JobRow.project, JobRow.key_id, JobRow.served, place).where(work).subquery()

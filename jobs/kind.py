@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -13,7 +14,7 @@ from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
 from certifier.growth.actions import Finish
-from certifier.isolation.child import Tell, run_in_child
+from certifier.isolation.child import Tell, prepare, run_in_child
 from certifier.model import Scene
 from certifier.outcome import DEADLINE, Outcome
 from db import steps
@@ -23,6 +24,9 @@ from db.settings import settings
 from db.states import STEP, StepState, unfinished
 from db.transaction import Afterwards
 from jobs.request import JobRequest
+
+LOOK_SECONDS, LOADING_SECONDS = 1.0, 60.0
+"""A step that waits for its child to load looks so often whether it is to give way, for so long."""
 
 
 @dataclass(frozen=True)
@@ -197,8 +201,23 @@ def in_child(function: str, payload: dict[str, Any], kept: tuple[str, str] | Non
         if tell is not None:
             tell(told)
 
-    found: dict[str, Any] = run_in_child(function, payload, timeout_s=seconds, memory_bytes=memory, kept=kept, tell=heard)
+    _wait_until_loaded(function, look)
+    try:
+        found: dict[str, Any] = run_in_child(function, payload, timeout_s=seconds, memory_bytes=memory, kept=kept, tell=heard)
+    except GivesWay:
+        prepare(function)  # the process that computed it has ended; another one loads while other jobs go on
+        raise
     return found
+
+
+def _wait_until_loaded(function: str, look: Callable[[], None]) -> None:
+    """Waits until what computes a function has loaded. Who gives way before leaves it to the next call."""
+    until = time.monotonic() + LOADING_SECONDS
+    while (began := time.monotonic()) < until:
+        prepare(function, LOOK_SECONDS)
+        if time.monotonic() - began < LOOK_SECONDS:
+            return
+        look()
 
 
 class GivesWay(Exception):

@@ -23,8 +23,9 @@ WAIT_SECONDS = 10.0
 """A process without a slot waits this long for a new job. Then the next message has it wait again."""
 LOOK_SECONDS = 0.25
 """It looks this often whether one is there."""
-TRIAL_SECONDS = 3.0
-"""A child's work for a new job may last this many seconds. Then it goes on only as long as no other new job waits."""
+TRIAL_SECONDS = 1.0
+"""A child's work for a new job may last this many seconds. Then it goes on only as long as no other new job comes before it: a newer one,
+or one of a key or project for which fewer processes work."""
 
 
 def work_for_newcomer(slots: Slots) -> Piece | None:
@@ -33,7 +34,7 @@ def work_for_newcomer(slots: Slots) -> Piece | None:
     until = time.monotonic() + WAIT_SECONDS
     while time.monotonic() < until and not slots.take():
         if (claim := _claim()) is not None:
-            with giving_way(_Trial(slots)):
+            with giving_way(_Trial(slots, claim.job_id)):
                 return do(claim)
         time.sleep(LOOK_SECONDS)
     return None
@@ -53,16 +54,16 @@ def _claim() -> pairs.Claim | steps.Claim | None:
 
 
 class _Trial:
-    """Gives a step up that has lasted long when another new job waits. Once a slot is free, the step is work like any other."""
+    """Gives a step of a job up that has lasted when another new job waits. Once a slot is free, the step is work like any other."""
 
-    def __init__(self, slots: Slots) -> None:
-        self._slots, self._until = slots, time.monotonic() + TRIAL_SECONDS
+    def __init__(self, slots: Slots, job_id: str) -> None:
+        self._slots, self._job_id, self._until = slots, job_id, time.monotonic() + TRIAL_SECONDS
 
     def __call__(self) -> None:
         if self._slots.take() or time.monotonic() < self._until:
             return
         waits = False
         with suppress(*UNAVAILABLE), database().read() as session:  # an outage is no reason to give anything up
-            waits = work.newcomer(session) is not None
+            waits = work.newcomer(session, instead_of=self._job_id) is not None
         if waits:
             raise GivesWay

@@ -267,6 +267,50 @@ def test_a_step_that_was_begun_before_is_left_to_the_solvers(db: Database) -> No
         assert work.next_job(session) == job_id
 
 
+def test_a_small_job_goes_on_to_its_end_before_new_jobs_that_nobody_has_begun(db: Database) -> None:
+    waiting = [a_job_of(db) for _ in range(2)]
+    small = a_job_of(db, pair_count=4)
+    with db.write() as session:
+        claim = work.claim(session, small, lease_seconds=60, batch_seconds=0.01)
+        assert isinstance(claim, pairs.Claim)
+    with db.write() as session:
+        pairs.save(session, claim, {(pair.index, 0): certified(pair.index)[pair.index, 0] for pair in claim.pairs})
+        assert jobs.lock(session, small).served > jobs.lock(session, waiting[1]).served
+    assert newcomer(db) == small
+    newest = a_job_of(db)
+    assert newcomer(db) == newest
+    with db.write() as session:
+        work.claim(session, newest, lease_seconds=60, batch_seconds=0.01)
+        jobs.lock(session, small).claimed_at = utcnow() - timedelta(seconds=work.NEWEST_SECONDS)
+    assert newcomer(db) == waiting[1], "it was served for a while"
+
+
+def test_who_has_the_process_for_new_jobs_leaves_it_to_newer_ones_and_to_those_who_have_fewer(db: Database) -> None:
+    def instead(of: str) -> str | None:
+        with db.read() as session:
+            return work.newcomer(session, instead_of=of)
+
+    for key in ("a", "b", "b"):
+        job_id = a_job_of(db, key, pair_count=0)
+        a_step(db, job_id)
+        claimed_step(db, job_id)
+    older = a_job_of(db, "b")
+    mine = a_job_of(db, "a", pair_count=0)
+    a_step(db, mine)
+    claimed_step(db, mine)
+    assert newcomer(db) == older
+    assert instead(mine) is None, "it had waited when mine came, and both keys have two"
+    newer = a_job_of(db, "b")
+    assert instead(mine) == newer
+    with db.write() as session:
+        assert work.claim(session, newer, lease_seconds=60, batch_seconds=0.5) is not None
+    assert instead(mine) is None
+    third = a_job_of(db, "c")
+    with db.write() as session:
+        jobs.lock(session, third).created_at = utcnow() - timedelta(seconds=30)
+    assert instead(mine) == third, "nobody works for this key"
+
+
 def test_new_jobs_of_a_project_that_has_more_solvers_than_another_wait(db: Database) -> None:
     """However many small jobs it asks for, it does not take the part of others."""
     for project, held in (("a", 2), ("b", 1)):

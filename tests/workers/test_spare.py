@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,7 @@ from db.models import JobRow, StepRow, WorkerRow
 from db.session import database
 from db.states import WorkerState
 from db.workers import Made, WorkerKind
+from jobs import kind
 from jobs.kind import GivesWay
 from tests.scenes import slider
 from tests.services import Queue
@@ -79,6 +82,38 @@ def test_a_small_job_ends_before_the_seedings_that_have_all_processes(
             assert all(found[name] == alone[name] for name in ("halfspace_normals", "halfspace_offsets", "inscribed_ellipsoid"))
 
 
+MANY, AT_ONCE_SECONDS = 100, 2.0
+SMALL: dict[str, Callable[[np.ndarray], dict[str, Any]]] = {
+    "certify": lambda s: box_around(s, 0.1),
+    "grow": lambda s: grow_box(s, 0.22, cells=200),
+}
+
+
+@pytest.mark.slow
+def test_a_small_job_is_begun_at_once_beside_a_hundred_long_ones(
+    planar: Scene, database_url: str, own_queue: Queue, tmp_path: Path
+) -> None:
+    own_queue.flush()
+    with running_service(database_url, own_queue.url, tmp_path):
+        assert ended(submit(planar, box_around(np.zeros(2), 0.1))).outcome == "certified"
+        long = [submit(planar, LONG) for _ in range(MANY)]
+        eventually(lambda: sum(seeding(job) is not None for job in long) >= 2, "all processes seed", every=1.0)
+        waited = []
+        for kind in SMALL:
+            for _ in range(5):
+                small = job_of(submit(planar, SMALL[kind](planar.to_s([0.0, 0.0]))))
+                done = ended(small.id)
+                assert done.outcome == "certified"
+                assert done.claimed_at is not None
+                assert done.finished_at is not None
+                waited.append((done.claimed_at - done.created_at).total_seconds())
+                print(
+                    f"{kind}: first piece after {waited[-1]:.1f} s, end after {(done.finished_at - done.created_at).total_seconds():.1f} s"
+                )
+        assert sum(job_of(job).state == "running" for job in long) > MANY / 2, "the long jobs have ended"
+    assert max(waited) < AT_ONCE_SECONDS
+
+
 @pytest.fixture
 def no_wait(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spare, "WAIT_SECONDS", 0.1)
@@ -101,16 +136,38 @@ def test_without_a_slot_only_what_new_jobs_wait_for_is_done(job_id: str, own_que
 
 def test_a_short_outage_of_the_database_fails_no_step(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spare, "TRIAL_SECONDS", 0.0)
-    trial = spare._Trial(Slots(0))
-    monkeypatch.setattr(spare.work, "newcomer", lambda session: "another job")
+    trial = spare._Trial(Slots(0), "the job")
+    monkeypatch.setattr(spare.work, "newcomer", lambda session, instead_of: "another job")
     with pytest.raises(GivesWay):
         trial()
 
-    def gone(session: object) -> str:
+    def gone(session: object, instead_of: str) -> str:
         raise OperationalError("", None, Exception("the server closed the connection"))
 
     monkeypatch.setattr(spare.work, "newcomer", gone)
     trial()
+
+
+@pytest.mark.parametrize("loaded", [False, True])
+def test_a_step_gives_way_while_its_child_loads_and_another_one_loads_then(loaded: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    loading = []
+
+    def prepare(function: str, wait_s: float = 0.0) -> None:
+        loading.append(wait_s)
+        time.sleep(0.0 if loaded else wait_s)
+
+    def computing(function: str, payload: object, *, tell: Callable[[dict[str, Any]], None], **_: object) -> None:
+        tell({})
+
+    def newer_job_waits() -> None:
+        raise GivesWay
+
+    monkeypatch.setattr(kind, "prepare", prepare)
+    monkeypatch.setattr(kind, "run_in_child", computing if loaded else None)
+    monkeypatch.setattr(kind, "LOOK_SECONDS", 0.05)
+    with kind.giving_way(newer_job_waits), pytest.raises(GivesWay):
+        kind.in_child("package.module:name", {})
+    assert loading == ([0.05, 0.0] if loaded else [0.05])
 
 
 @pytest.mark.usefixtures("no_wait")
