@@ -30,7 +30,10 @@ COLOURS = 128
 MODEL = ARMS["ur5_gripper"].file.parent
 """The folder of a maker's arm, from the packages of the tests."""
 PATIENCE_MS, SECONDS = 240_000, 240
-"""For a page, and for a region that has a share of its starting region."""
+"""For a page, and for some iterations of a job."""
+ITERATIONS = 6
+ELSEWHERE = [1.2, -0.8, 0.9]
+"""A configuration of arm_3dof, away from its seed."""
 Prepare = Callable[[Page], object]
 
 
@@ -40,16 +43,31 @@ def main() -> None:
         browser = playwright.chromium.launch(executable_path=chromium)
         asked = ciris.connect(service.url)
         planar, arm, bin_ = (asked.add_scene(ROOT / "examples" / name / "scene.yaml") for name in ("planar_2dof", "arm_3dof", "ur3e_bin"))
-        asked.cover(planar, coverage=0.8, deadline=300)
-        done, other = (asked.submit_grow(arm, seed("arm_3dof"), deadline=200, **options) for options in ({}, {"cells": 20, "stages": 1}))
-        regions = [job.result().id for job in (done, other)]
-        ids = {"planar": planar.id, "pair": done.id, "other": other.id, "region": regions[0], "smaller": regions[1]}
+        padded = asked.add_scene(with_padding(ROOT / "examples" / "planar_2dof", Path(data) / "padded"))
+        covers = [asked.submit_cover(scene, coverage=0.8, deadline=200).wait() for scene in (planar, padded)]
+        jobs = [asked.submit_grow(arm, q, deadline=200) for q in (seed("arm_3dof"), ELSEWHERE)]
+        regions = [job.result().id for job in jobs]
+        ids = {
+            "planar": planar.id,
+            "pair": jobs[0].id,
+            "region": regions[0],
+            "other": regions[1],
+            "cover": covers[0].id,
+            "padded": covers[1].id,
+        }
         views(browser, service.url, ids)
         growing = asked.submit_grow(bin_, seed("ur3e_bin"), deadline=600)
-        growing_views(browser, service.url, growing.id)
-        growing.cancel().wait()
+        growing_views(browser, service.url, asked, growing.id)
         shoot(browser, f"{service.url}/new", "dashboard_meshes", "#new-upload", own_robot, part=".stage .robot")
         browser.close()
+
+
+def with_padding(example: Path, to: Path) -> Path:
+    """Returns the scene file of a copy of an example whose bodies are 3 cm larger."""
+    shutil.copytree(example, to)
+    scene = to / "scene.yaml"
+    scene.write_text(f"{scene.read_text().replace('name: planar-2dof', 'name: planar-padded')}\npadding: 0.03\n")
+    return scene
 
 
 def seed(example: str) -> Any:
@@ -75,37 +93,27 @@ def views(browser: Browser, url: str, ids: dict[str, str]) -> None:
     )
     shoot(
         browser,
-        f"{url}/compare?a={ids['region']}&b={ids['smaller']}",
+        f"{url}/compare?a={ids['region']}&b={ids['other']}",
         "dashboard_compare",
         "text=of this slice is in certified regions",
         part=".slice",
     )
-    both = f"{url}/compare/jobs?a={ids['pair']}&b={ids['other']}"
+    both = f"{url}/compare/jobs?a={ids['cover']}&b={ids['padded']}"
     shoot(browser, both, "dashboard_compare_jobs", "figure.share", part="[data-island=compare-jobs] section")
     shoot(browser, f"{url}/jobs/{ids['pair']}", "dashboard_pair", "role=grid", pair)
     shoot(browser, f"{url}/jobs/{ids['pair']}", "dashboard_contact", "role=grid", part="section[aria-labelledby=h-obstacles]")
-    shoot(browser, f"{url}/jobs/{ids['pair']}", "dashboard_timeline", "role=grid", part="section[aria-labelledby=h-timeline]")
 
 
-def growing_views(browser: Browser, url: str, job: str) -> None:
-    """Takes the pictures of a job that runs, once it has certified a region of its starting region, or after some minutes."""
+def growing_views(browser: Browser, url: str, asked: ciris.Service, job: str) -> None:
+    """Takes the pictures of a job that runs, once some iterations have begun, or after some minutes."""
     until = time.monotonic() + SECONDS
-    while time.monotonic() < until and "Shares are estimated" not in browser_text(browser, f"{url}/jobs/{job}"):
-        time.sleep(5)
+    while time.monotonic() < until and len(asked.client.job_pairs(job)["iterations"]) < ITERATIONS:
+        time.sleep(1)
     shoot(browser, f"{url}/jobs/{job}", "dashboard_job", "role=grid")
     shoot(browser, f"{url}/jobs/{job}", "dashboard_job_phone", "role=grid", size=PHONE)
     shoot(browser, url, "dashboard_jobs", "tbody tr")
-
-
-def browser_text(browser: Browser, address: str) -> str:
-    """What a page says."""
-    page = browser.new_page()
-    page.set_default_timeout(PATIENCE_MS)
-    page.goto(address)
-    page.locator("role=grid").or_(page.locator(".empty")).first.wait_for()
-    text = page.locator("main").text_content() or ""
-    page.close()
-    return text
+    asked.job(job).wait()
+    shoot(browser, f"{url}/jobs/{job}", "dashboard_timeline", "role=grid", part="section[aria-labelledby=h-timeline]")
 
 
 def planning(page: Page) -> None:
@@ -164,7 +172,7 @@ def shoot(
     page.wait_for_timeout(2500)
     file = PICTURES / f"{name}.png"
     if part is None:
-        page.evaluate("scrollTo(0, 0)")
+        page.evaluate("scrollTo(0, 0)" if size is WIDE else "document.querySelector('.robot, .pairs')?.scrollIntoView()")
         page.wait_for_timeout(1000)
         page.screenshot(path=file, full_page=size is WIDE)
     else:
