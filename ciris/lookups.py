@@ -34,8 +34,8 @@ DEPTH = 512
 
 ROOM = 64
 """There is room for this many ranges at first."""
-HALVINGS = 16
-"""Where a motion passes an oblique cut is known up to this many halvings of the motion."""
+HALVINGS, CLOSE = 16, 1e-4
+"""Where a motion passes an oblique cut is known up to this part of the motion, or to this many halvings of it."""
 
 
 class Cells(NamedTuple):
@@ -334,12 +334,19 @@ def _beyond(
         bent *= (b - a) ** 2 / 8
         if max(first, last) + bent <= 0:
             continue
-        if min(first, last) - bent <= 0 and halvings < HALVINGS and a < b:
-            middle = (a + b) / 2
-            waiting[top, 0], waiting[top, 1], waiting[top + 1, 0], waiting[top + 1, 1] = middle, b, a, middle
-            level[top] = level[top + 1] = halvings + 1
-            top += 2
-        elif found[0] > found[1]:
+        if min(first, last) - bent <= 0 and a < b:
+            passed = abs(last - first)
+            if halvings < HALVINGS and 2 * bent * (b - a) > CLOSE * passed:
+                middle = (a + b) / 2
+                waiting[top, 0], waiting[top, 1], waiting[top + 1, 0], waiting[top + 1, 1] = middle, b, a, middle
+                level[top] = level[top + 1] = halvings + 1
+                top += 2
+                continue
+            if first < last:
+                a += max(0.0, -bent - first) / passed * (b - a)
+            elif first > last:
+                b -= max(0.0, -bent - last) / passed * (b - a)
+        if found[0] > found[1]:
             found = a, b, np.inf, -np.inf
         elif found[2] > found[3] and a <= found[1]:
             found = found[0], b, np.inf, -np.inf
