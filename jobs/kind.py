@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -201,17 +202,26 @@ def in_child(function: str, payload: dict[str, Any], kept: tuple[str, str] | Non
         if tell is not None:
             tell(told)
 
-    _wait_until_loaded(function, look)
+    module = function.partition(":")[0]
+    if module not in _loaded:
+        _wait_until_loaded(function, look)
+        _loaded.add(module)
     try:
         found: dict[str, Any] = run_in_child(function, payload, timeout_s=seconds, memory_bytes=memory, kept=kept, tell=heard)
     except GivesWay:
+        _loaded.discard(module)
         prepare(function)  # the process that computed it has ended; another one loads while other jobs go on
         raise
     return found
 
 
+_loaded: set[str] = set()
+"""The modules that a child of this process has loaded."""
+os.register_at_fork(after_in_child=_loaded.clear)
+
+
 def _wait_until_loaded(function: str, look: Callable[[], None]) -> None:
-    """Waits until what computes a function has loaded. Who gives way before leaves it to the next call."""
+    """Waits until what computes a function says that it has loaded. Who gives way before leaves it to the next call."""
     until = time.monotonic() + LOADING_SECONDS
     while (began := time.monotonic()) < until:
         prepare(function, LOOK_SECONDS)

@@ -97,6 +97,7 @@ def test_a_small_job_is_begun_at_once_beside_a_hundred_long_ones(
     with running_service(database_url, own_queue.url, tmp_path):
         assert ended(submit(planar, box_around(np.zeros(2), 0.1))).outcome == "certified"
         long = [submit(planar, LONG) for _ in range(MANY)]
+        eventually(lambda: all(job_of(job).state == "running" for job in long), "all have begun", every=1.0)
         eventually(lambda: sum(seeding(job) is not None for job in long) >= 2, "all processes seed", every=1.0)
         waited = []
         for kind in SMALL:
@@ -156,18 +157,24 @@ def test_a_step_gives_way_while_its_child_loads_and_another_one_loads_then(loade
         loading.append(wait_s)
         time.sleep(0.0 if loaded else wait_s)
 
-    def computing(function: str, payload: object, *, tell: Callable[[dict[str, Any]], None], **_: object) -> None:
+    def computing(function: str, payload: object, *, tell: Callable[[dict[str, Any]], None], **_: object) -> dict[str, Any]:
         tell({})
+        return {}
 
     def newer_job_waits() -> None:
         raise GivesWay
 
+    monkeypatch.setattr(kind, "_loaded", set())
     monkeypatch.setattr(kind, "prepare", prepare)
     monkeypatch.setattr(kind, "run_in_child", computing if loaded else None)
     monkeypatch.setattr(kind, "LOOK_SECONDS", 0.05)
     with kind.giving_way(newer_job_waits), pytest.raises(GivesWay):
         kind.in_child("package.module:name", {})
     assert loading == ([0.05, 0.0] if loaded else [0.05])
+    if loaded:
+        for _ in range(2):
+            kind.in_child("package.module:name", {})
+        assert loading == [0.05, 0.0, 0.05], "it says only once that it has loaded"
 
 
 @pytest.mark.usefixtures("no_wait")
