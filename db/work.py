@@ -31,8 +31,6 @@ MOST_KEYS = 100_000
 """The jobs of at most this many keys are compared when the next one is chosen."""
 NEW_SECONDS = 60.0
 """A job counts as new for this long after a solver has first begun a piece of it."""
-NEWEST_SECONDS = 10.0
-"""Among new jobs of a key the newest goes first, unless it was begun longer ago than this."""
 ROUNDING = 1e-9
 """Sums of fractions of batches may be too large by so much."""
 Placed = Row[tuple[str, str, str | None, float, int]]
@@ -85,8 +83,8 @@ def newcomer(session: Session, *, instead_of: str | None = None) -> str | None:
         instead_of: the job that has this process. The process goes on to a newer job, or to one of a project or key for which fewer work.
     """
     now = utcnow()
-    times = {"now": now, "since": now - timedelta(seconds=NEW_SECONDS), "lately": now - timedelta(seconds=NEWEST_SECONDS)}
-    found = session.execute(_placed(new=True), {**times, "places": 1, "most": MOST_KEYS}).all()
+    since = now - timedelta(seconds=NEW_SECONDS)
+    found = session.execute(_placed(new=True), {"now": now, "since": since, "places": 1, "most": MOST_KEYS}).all()
     if not found:
         return None
     of_project, of_key = held = _held(session)
@@ -222,11 +220,11 @@ def _placed(new: bool = False) -> Select[tuple[str, str, str | None, float, int]
     So a job that has just started gets its first piece at once, also beside a hundred of the same key.
 
     Args:
-        new: whether only new jobs of which no solver does anything are among them, and steps that were begun before count as no work. What
-            they were served counts only once they were begun a while ago, so that a small job goes on to its end beside others that wait.
+        new: whether only new jobs of which no solver does anything are among them, and steps that were begun before count as no work. The
+            newest goes first whatever it was served, so that a small job goes on to its end beside others that wait.
     """
-    served = case((JobRow.claimed_at <= bindparam("lately", type_=Utc()), JobRow.served), else_=-1.0) if new else JobRow.served
-    order = (served, JobRow.created_at.desc(), JobRow.id)
+    newest = (JobRow.created_at.desc(), JobRow.id)
+    order = newest if new else (JobRow.served, *newest)
     place = func.row_number().over(partition_by=(JobRow.project, JobRow.key_id), order_by=order).label("place")
     work = and_(_is_new(), _has_work(fresh=True), ~_has_solver()) if new else _has_work()
     placed = select(JobRow.id, JobRow.project, JobRow.key_id, JobRow.served, place).where(work).subquery()
