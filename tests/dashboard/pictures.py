@@ -43,31 +43,15 @@ def main() -> None:
         browser = playwright.chromium.launch(executable_path=chromium)
         asked = ciris.connect(service.url)
         planar, arm, bin_ = (asked.add_scene(ROOT / "examples" / name / "scene.yaml") for name in ("planar_2dof", "arm_3dof", "ur3e_bin"))
-        padded = asked.add_scene(with_padding(ROOT / "examples" / "planar_2dof", Path(data) / "padded"))
-        covers = [asked.submit_cover(scene, coverage=0.8, deadline=200).wait() for scene in (planar, padded)]
+        asked.cover(planar, coverage=0.8, deadline=300)
         jobs = [asked.submit_grow(arm, q, deadline=200) for q in (seed("arm_3dof"), ELSEWHERE)]
         regions = [job.result().id for job in jobs]
-        ids = {
-            "planar": planar.id,
-            "pair": jobs[0].id,
-            "region": regions[0],
-            "other": regions[1],
-            "cover": covers[0].id,
-            "padded": covers[1].id,
-        }
+        ids = {"planar": planar.id, "pair": jobs[0].id, "region": regions[0], "other": regions[1]}
         views(browser, service.url, ids)
         growing = asked.submit_grow(bin_, seed("ur3e_bin"), deadline=600)
         growing_views(browser, service.url, asked, growing.id)
         shoot(browser, f"{service.url}/new", "dashboard_meshes", "#new-upload", own_robot, part=".stage .robot")
         browser.close()
-
-
-def with_padding(example: Path, to: Path) -> Path:
-    """Returns the scene file of a copy of an example whose bodies are 3 cm larger."""
-    shutil.copytree(example, to)
-    scene = to / "scene.yaml"
-    scene.write_text(f"{scene.read_text().replace('name: planar-2dof', 'name: planar-padded')}\npadding: 0.03\n")
-    return scene
 
 
 def seed(example: str) -> Any:
@@ -98,8 +82,6 @@ def views(browser: Browser, url: str, ids: dict[str, str]) -> None:
         "text=of this slice is in certified regions",
         part=".slice",
     )
-    both = f"{url}/compare/jobs?a={ids['cover']}&b={ids['padded']}"
-    shoot(browser, both, "dashboard_compare_jobs", "figure.share", part="[data-island=compare-jobs] section")
     shoot(browser, f"{url}/jobs/{ids['pair']}", "dashboard_pair", "role=grid", pair)
     shoot(browser, f"{url}/jobs/{ids['pair']}", "dashboard_contact", "role=grid", part="section[aria-labelledby=h-obstacles]")
 

@@ -1,6 +1,6 @@
 // What a page shows stands in its address, so that whoever opens the address sees the same.
 import { useEffect } from "preact/hooks";
-import { withUnits } from "./units";
+import { leaving, withUnits } from "./units";
 
 /** A value, several of them under one name, or null for one that the address does not have. */
 export type Stated = Record<string, string | string[] | null>;
@@ -17,6 +17,7 @@ export function inAddress(name: string): string | null {
 export function useAddress(stated: Stated): void {
   useEffect(() => {
     const timer = setTimeout(() => {
+      if (leaving) return;
       const query = new URLSearchParams(location.search);
       for (const [name, value] of Object.entries(stated)) {
         query.delete(name);

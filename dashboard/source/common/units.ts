@@ -36,6 +36,9 @@ export function bare(value: number, unit: Unit): string {
   return (value / SHOWN[unit].scale).toFixed(SHOWN[unit].digits).replace(/^-(?=[0.]*$)/, "");
 }
 
+/** Whether the page is being loaded again with another choice. Its address is that of the next page then. */
+export let leaving = false;
+
 /** The address with the choice, if it is not the usual one. */
 export function withUnits(query: URLSearchParams): string {
   if (RADIANS) query.set(KEY, "rad");
@@ -60,6 +63,7 @@ export function startUnits(): void {
     localStorage.setItem(KEY, RADIANS ? "deg" : "rad");
     const query = new URLSearchParams(location.search);
     query.delete(KEY);
+    leaving = true;
     // A new address without a fragment loads the page; one that differs only there does not.
     history.replaceState(null, "", `${location.pathname}${query.size ? `?${query}` : ""}${location.hash}`);
     location.reload();
