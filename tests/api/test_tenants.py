@@ -9,12 +9,14 @@ import secrets
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import httpx2
 import pytest
 import yaml
 from sqlalchemy import insert, select
@@ -26,12 +28,16 @@ from db.keys import Scope
 from db.models import DEFAULT_PROJECT, ApiKeyRow, PairRow, StepRow
 from db.session import Database
 from db.types import utcnow
+from tests.api.test_hostile_uploads import URDF, zipped
+from tests.api.test_places import LINK
 from tests.services import Postgres
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 KEYS = 200_000
 REQUESTS = 500
+JITTER_MS = 5.0
+"""The machine of the tests is no quieter than that."""
 
 
 @contextmanager
@@ -94,7 +100,66 @@ def test_keys_of_another_project_cost_nothing(database: str, tmp_path: Path, req
     db.close()
     print(f"{database}, milliseconds without and with {KEYS} keys: {before} {after}")
     assert after["p50"] < 2 * before["p50"]
-    assert after["p99"] < 2 * before["p99"] + 5.0
+    assert after["p99"] < 2 * before["p99"] + JITTER_MS
+
+
+@contextmanager
+def uploads_that_last(url: str, key: str) -> Iterator[Counter[int]]:
+    """Four clients send small zips with a mesh of 60 MB all the time; how often which status was answered."""
+    mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n" + "f 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n" * (60 * 2**20 // 32)
+    data = zipped(**{"arm.urdf": URDF.format(LINK), "m.obj": mesh})
+    assert len(data) < 400_000
+    over, answered = threading.Event(), Counter[int]()
+
+    def upload() -> None:
+        with httpx2.Client(base_url=url, headers={"Authorization": f"Bearer {key}"}, timeout=300) as client:
+            while not over.is_set():
+                answered[client.post("/v1/scenes", files={"bundle": ("scene.zip", data, "application/zip")}).status_code] += 1
+
+    threads = [threading.Thread(target=upload) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    time.sleep(5)  # two are being read, and two wait
+    try:
+        yield answered
+    finally:
+        over.set()
+        for thread in threads:
+            thread.join()
+
+
+@contextmanager
+def jobs_of_nine_keys(url: str, keys_of_others: list[str]) -> Iterator[None]:
+    """Nine jobs of another project have all solvers."""
+    for key in keys_of_others:
+        with Client(url, key) as client:
+            grow(client, deadline_seconds=600)
+    time.sleep(5)
+    yield
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("attack", ["uploads", "jobs"])
+def test_the_work_of_another_project_costs_requests_little(attack: str, tmp_path: Path) -> None:
+    url = f"sqlite:///{tmp_path / 'ciris.sqlite3'}"
+    migrate.upgrade(url)
+    db = Database(url)
+    with db.write() as session:
+        projects.add(session, "others")
+        theirs = [keys.add(session, f"key{i}", Scope.SUBMIT, "others") for i in range(9)]
+        own = keys.add(session, "own", Scope.SUBMIT)
+    db.close()
+    with a_service(tmp_path / "data", url, solvers=2) as service, Client(service, own) as client:
+        client.add_scene(EXAMPLES / "planar_2dof" / "scene.yaml")
+        latencies(service, own)
+        before = latencies(service, own)
+        with uploads_that_last(service, theirs[0]) if attack == "uploads" else jobs_of_nine_keys(service, theirs) as answered:
+            after, began = latencies(service, own), time.monotonic()
+            client.add_scene(EXAMPLES / "planar_2dof" / "scene.yaml")
+            upload_seconds = time.monotonic() - began
+    print(f"{attack}: milliseconds before and beside it: {before} {after}; an upload of its own {upload_seconds:.1f} s; {answered}")
+    assert after["p99"] < 2 * before["p99"] + JITTER_MS
+    assert upload_seconds < 10
 
 
 def grow(client: Client, deadline_seconds: float) -> str:
@@ -137,7 +202,7 @@ def until(condition: Callable[[], bool], end: float) -> None:
 
 @pytest.mark.slow
 def test_nine_keys_leave_another_project_its_part(tmp_path: Path) -> None:
-    """Nine jobs of one project, each of a key of its own, run on two solvers. A job of another one has the first within seconds."""
+    """Nine jobs of one project, each of a key of its own, run on two solvers. Nine of one key of another project get as much."""
     url = f"sqlite:///{tmp_path / 'ciris.sqlite3'}"
     migrate.upgrade(url)
     db = Database(url)
@@ -154,8 +219,11 @@ def test_nine_keys_leave_another_project_its_part(tmp_path: Path) -> None:
             asked = time.monotonic()
             job = grow(client, deadline_seconds=600)
             until(lambda: held(db, job), asked + 120)
-            waited, shares = time.monotonic() - asked, solvers_of(db, 45.0)
+            waited = time.monotonic() - asked
+            for _ in range(8):
+                grow(client, deadline_seconds=600)
+            shares = solvers_of(db, 150.0)
     db.close()
     print(f"first piece after {waited:.1f} s; then solvers by project: {shares}")
     assert waited < 30.0
-    assert shares[DEFAULT_PROJECT] > shares["many"] / 2
+    assert shares[DEFAULT_PROJECT] / sum(shares.values()) == pytest.approx(0.5, rel=0.1)
