@@ -27,7 +27,7 @@ from db.transaction import Afterwards
 from jobs.request import JobRequest
 
 LOOK_SECONDS, LOADING_SECONDS = 1.0, 60.0
-"""A step that waits for its child to load looks so often whether it is to give way, for so long."""
+"""A step whose child loads looks every LOOK_SECONDS whether it is to give way, and waits for LOADING_SECONDS at most."""
 
 
 @dataclass(frozen=True)
