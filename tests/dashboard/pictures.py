@@ -93,7 +93,6 @@ def growing_views(browser: Browser, url: str, asked: ciris.Service, job: str) ->
         time.sleep(1)
     shoot(browser, f"{url}/jobs/{job}", "dashboard_job", "role=grid")
     shoot(browser, f"{url}/jobs/{job}", "dashboard_job_phone", "role=grid", size=PHONE)
-    shoot(browser, url, "dashboard_jobs", "tbody tr")
     asked.job(job).wait()
     shoot(browser, f"{url}/jobs/{job}", "dashboard_timeline", "role=grid", part="section[aria-labelledby=h-timeline]")
 
