@@ -68,7 +68,7 @@ class Closest:
     distance: float | None
     """Euclidean distance in s; 0 where the other one is proved itself, None where none was found."""
     complete: bool
-    """Whether none is nearer, but for what oblique cuts prove. False where the search ended early."""
+    """Whether none is nearer; before an oblique cut, by more than 0.001. False where the search ended early."""
     boxes: int
     """How many boxes the search looked at."""
 

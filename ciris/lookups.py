@@ -96,7 +96,7 @@ def points(cells: Cells, X: Floats, found: NDArray[np.bool_]) -> None:
         left[count] = i
         count += _within(cells, X[i])
         if len(cells.normals):
-            _fill_s(cells, X[i], X[i], 0.0, S[i])
+            fill_s(cells, X[i], X[i], 0.0, S[i])
     for clause in range(len(cells.first) - 1):
         begin, end, n = cells.first[clause], cells.first[clause + 1], 0
         for place in range(count):
@@ -123,7 +123,7 @@ def _leaf(nodes: NDArray[np.void], tolerance: Floats, normals: Floats, root: int
     while node >= 0:
         at = nodes[node]
         if at.joint == OBLIQUE:
-            if _along(normals[at.upper], s) <= at.cut:
+            if along(normals[at.upper], s) <= at.cut:
                 return PROVED, near
             node = lower_part(nodes, node)
             continue
@@ -134,7 +134,7 @@ def _leaf(nodes: NDArray[np.void], tolerance: Floats, normals: Floats, root: int
 
 
 @njit(cache=True)
-def _along(normal: Floats, s: Floats) -> float:
+def along(normal: Floats, s: Floats) -> float:
     """Returns where a configuration is along a normal."""
     t = 0.0
     for j in range(len(s)):
@@ -143,7 +143,7 @@ def _along(normal: Floats, s: Floats) -> float:
 
 
 @njit(cache=True)
-def _fill_s(cells: Cells, x: Floats, y: Floats, t: float, s: Floats) -> None:
+def fill_s(cells: Cells, x: Floats, y: Floats, t: float, s: Floats) -> None:
     """Fills in where a motion is at t, in s."""
     for j in range(len(s)):
         offset = x[j] + t * (y[j] - x[j]) - cells.q_star[j]
@@ -324,9 +324,9 @@ def _beyond(
     while top:
         top -= 1
         a, b, halvings = waiting[top, 0], waiting[top, 1], level[top]
-        _fill_s(cells, x, y, a, ends[0])
-        _fill_s(cells, x, y, b, ends[1])
-        first, last, bent = _along(normal, ends[0]) - value, _along(normal, ends[1]) - value, 0.0
+        fill_s(cells, x, y, a, ends[0])
+        fill_s(cells, x, y, b, ends[1])
+        first, last, bent = along(normal, ends[0]) - value, along(normal, ends[1]) - value, 0.0
         for j in range(n):
             if cells.revolute[j]:
                 s = max(abs(ends[0, j]), abs(ends[1, j]))

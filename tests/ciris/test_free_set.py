@@ -281,8 +281,27 @@ def test_oblique_cuts_are_half_spaces_of_s(tmp_path_factory, drawn, motions, rev
             assert reach[proved > 1e-2].all()
 
 
+@settings(deadline=None, max_examples=200)
+@given(st.lists(st.lists(oblique_trees, min_size=1, max_size=2), min_size=1, max_size=2), grids(15), st.sampled_from([np.inf, 1.0]))
+def test_before_oblique_cuts_the_nearest_is_free_and_no_sample_is_much_nearer(tmp_path_factory, drawn, q, closer_than) -> None:
+    box = np.array([[-LIMIT] * N, [LIMIT] * N])
+    wanted = [[inside_limits(tree, box) for tree in members] for members in drawn]
+    found = FreeSet.load(written(tmp_path_factory.mktemp("free") / "cell.npz", wanted))
+    closest = found.nearest(q, closer_than=closer_than)
+    around = np.random.default_rng(0).uniform(-LIMIT, LIMIT, (20_000, N))
+    samples = np.concatenate([around, q + 0.2 * around, q + 0.02 * around])
+    samples = samples[found.contains(samples)]
+    nearest_sample = np.linalg.norm(found.to_s(samples) - found.to_s(q), axis=1).min(initial=np.inf)
+    if closest.q is None:
+        assert nearest_sample >= closer_than - 2e-3 or not closest.complete
+    else:
+        assert found.contains(closest.q)
+        assert closest.distance == pytest.approx(np.linalg.norm(found.to_s(closest.q) - found.to_s(q)), abs=1e-12)
+        assert closest.distance < closer_than
+        assert closest.distance <= nearest_sample + 2e-3 or not closest.complete
+
+
 def test_what_an_oblique_cut_proves_is_nearer(tmp_path: Path) -> None:
-    """Where nothing but the half-space before a face is proved, the answer is a part of a whole cell, moved up to the face."""
     tree = (0, -1.5, PROVED, (OBLIQUE, 0.0, PROVED, OPEN, [1.0, 0.0, 0.0]))
     found = FreeSet.load(written(tmp_path / "cell.npz", [[tree]]))
     closest = found.nearest([0.5, 0.0, 0.0])

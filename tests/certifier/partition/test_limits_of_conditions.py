@@ -41,7 +41,7 @@ def test_every_cell_has_the_plane_of_the_limit(condition: Condition, monkeypatch
     def never(*_: Any) -> None:
         raise AssertionError("a plane is looked for")
 
-    monkeypatch.setattr(bodies, "_separate", never)
+    monkeypatch.setattr(bodies, "separated", never)
     found = alone(condition)
     shared = CellCertification(found, cube(found, 0.0, HALF))
     for i in range(len(found.pairs)):
