@@ -53,7 +53,7 @@ def test_the_page_of_a_map_says_what_is_proved_of_each_path(page: Any, url: str,
     page.goto(f"{url}/jobs/{job}")
     page.locator(".title .badge.succeeded").wait_for(timeout=60_000)
     shares = client.get(f"/v1/jobs/{job}/map").json()["stored"]["paths"]
-    rows = page.get_by_role("region", name="Paths wanted first").locator("tbody tr")
+    rows = page.get_by_role("region", name="Motions wanted first").locator("tbody tr")
     assert rows.locator("td:nth-child(2)").all_text_contents() == ["2", "3"]
     shown = [float(text.removesuffix(" %")) for text in rows.locator("td:nth-child(3)").all_text_contents()]
     assert all(100 * share - 0.1 <= said <= 100 * share for said, share in zip(shown, shares, strict=True))

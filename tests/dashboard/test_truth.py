@@ -117,7 +117,7 @@ def test_a_configuration_of_which_nothing_is_known_is_not_said_to_be_free(page: 
 
 def test_whoever_signs_in_again_comes_back_to_the_same_place(browser: Any, url: str, database: Database, planar: Scene) -> None:
     with database.write() as session:
-        key = keys.add(session, "reader", Scope.READ)
+        key = keys.add(session, "operator", Scope.SUBMIT)
     context = browser.new_context()
     page = context.new_page()
     page.goto(f"{url}/new?scene=planar&q=0.1,-0.2")
