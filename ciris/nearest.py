@@ -30,7 +30,7 @@ another one if its sides together are less than SMALLER of the other's. The answ
 free.
 """
 FACES = 16
-"""So many oblique cuts that a configuration is beyond are looked at. What others prove of its cell counts as open."""
+"""At most FACES oblique cuts that a configuration is beyond are looked at. What others prove of its cell counts as open."""
 
 
 class Aim(NamedTuple):
