@@ -35,7 +35,7 @@ SAME_SITE = frozenset({"same-origin", "none"})
 """A browser says so of requests that come from the service's own pages, or from the person: by a bookmark or the address line."""
 STATIC = "/static/"
 SIGN_INS_PER_SECOND = 5.0
-"""One address may come back from the identity provider so often, for long. Each time the service asks the provider, who knows only it."""
+"""One address may return from the identity provider this often, on average. At each return, the service asks the provider."""
 WATCHED = frozenset({"/metrics"})
 """Monitoring asks for these. They are answered while the database hangs."""
 

@@ -184,7 +184,7 @@ class FreeSet(InSpace):
             raise RegionError("wrong_length", f"it has the shape {given.shape}", field="q", hint="ask about one configuration at a time")
         if closer_than > 0 and self.contains(given):
             return Closest(given, 0.0, True, 0)
-        aim, found = Aim(given, space.to_s(given), space.q_star, space.revolute), np.full(len(given), np.nan)
+        aim, found = Aim(given, space.to_s(given)), np.full(len(given), np.nan)
         distance, looked, complete = nearest(self._cells, aim, float(closer_than), boxes, found)
         if np.isnan(found[0]):
             return Closest(None, None, complete, looked)

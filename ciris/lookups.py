@@ -146,8 +146,14 @@ def along(normal: Floats, s: Floats) -> float:
 def fill_s(cells: Cells, x: Floats, y: Floats, t: float, s: Floats) -> None:
     """Fills in where a motion is at t, in s."""
     for j in range(len(s)):
-        offset = x[j] + t * (y[j] - x[j]) - cells.q_star[j]
-        s[j] = np.tan(offset / 2) if cells.revolute[j] else offset
+        s[j] = in_s(cells, j, x[j] + t * (y[j] - x[j]))
+
+
+@njit(cache=True)
+def in_s(cells: Cells, j: int, q: float) -> float:
+    """Returns a position of a joint in s."""
+    offset = q - cells.q_star[j]
+    return np.tan(offset / 2) if cells.revolute[j] else offset
 
 
 @njit(cache=True)

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ciris.lookups import DEPTH, OBLIQUE, OPEN, PROVED, Cells, Floats, along, fill_s, lower_part
+from ciris.lookups import DEPTH, OBLIQUE, OPEN, PROVED, Cells, Floats, along, fill_s, in_s, lower_part
 
 MARGIN = 2.0
 """The answer is this many tolerances away from open cells and from the joint limits, so that rounding leaves it free."""
@@ -38,14 +38,10 @@ class Aim(NamedTuple):
 
     Attributes:
         q, s: (n,) the configuration.
-        q_star: (n,) the positions at which s is 0.
-        revolute: (n,) True where s = tan((q - q*) / 2), False where s = q - q*.
     """
 
     q: Floats
     s: Floats
-    q_star: Floats
-    revolute: NDArray[np.bool_]
 
 
 class Faces(NamedTuple):
@@ -107,7 +103,7 @@ def nearest(cells: Cells, aim: Aim, closer_than: float, most: int, found: Floats
         square = 0.0
         for j in range(n):
             x[j] = min(max(aim.q[j], box[0, j]), box[1, j])
-            gap[j] = _gap(aim, j, x[j]) if x[j] != aim.q[j] else 0.0
+            gap[j] = _gap(cells, aim, j, x[j]) if x[j] != aim.q[j] else 0.0
             square += gap[j] ** 2
         left = _cell_at(cells, aim, margin, box, x, gap, cell, keys, faces, room)
         plunging = left > 0 and (plunging or looked % PLUNGE == 1 or best == closer_than)
@@ -124,7 +120,7 @@ def nearest(cells: Cells, aim: Aim, closer_than: float, most: int, found: Floats
             if _sides(part) > SMALLER * _sides(box):
                 count = _halved(cells, row, faces.values[f], part, halves)
             for i in range(count):
-                key = _distance(aim, halves[i])
+                key = _distance(cells, aim, halves[i])
                 if key < best:
                     if used == len(boxes):
                         before, boxes = boxes, np.empty((2 * used, 2, n))
@@ -157,12 +153,6 @@ def _no_faces(n: int) -> Faces:
 
 
 @njit(cache=True)
-def _s(cells: Cells, j: int, q: float) -> float:
-    offset = q - cells.q_star[j]
-    return np.tan(offset / 2) if cells.revolute[j] else offset
-
-
-@njit(cache=True)
 def _before(cells: Cells, row: int, value: float, box: Floats, part: Floats) -> bool:
     """Fills in the box around what the half-space before an oblique cut has of a box, (2, n), and returns whether that is anything."""
     normal, room = cells.normals[row], value - INSIDE
@@ -170,12 +160,12 @@ def _before(cells: Cells, row: int, value: float, box: Floats, part: Floats) -> 
         if box[0, j] > box[1, j]:
             return False
         part[0, j], part[1, j] = box[0, j], box[1, j]
-        room -= normal[j] * _s(cells, j, box[0 if normal[j] > 0 else 1, j])
+        room -= normal[j] * in_s(cells, j, box[0 if normal[j] > 0 else 1, j])
     if room < 0:
         return False
     for j in range(len(normal)):
         if normal[j] != 0:
-            end = _s(cells, j, box[0 if normal[j] > 0 else 1, j]) + room / normal[j]
+            end = in_s(cells, j, box[0 if normal[j] > 0 else 1, j]) + room / normal[j]
             end = cells.q_star[j] + (2 * np.arctan(end) if cells.revolute[j] else end)
             if normal[j] > 0:
                 part[1, j] = min(part[1, j], end)
@@ -189,7 +179,7 @@ def _width(cells: Cells, row: int, box: Floats) -> float:
     """Returns how far apart the corners of a box are along a normal."""
     total, normal = 0.0, cells.normals[row]
     for j in range(len(normal)):
-        total += abs(normal[j]) * (_s(cells, j, box[1, j]) - _s(cells, j, box[0, j]))
+        total += abs(normal[j]) * (in_s(cells, j, box[1, j]) - in_s(cells, j, box[0, j]))
     return total
 
 
@@ -203,7 +193,7 @@ def _corner(cells: Cells, aim: Aim, row: int, box: Floats, x: Floats, gap: Float
     square, normal = 0.0, cells.normals[row]
     for j in range(len(normal)):
         x[j] = min(max(aim.q[j], box[0, j]), box[1, j]) if normal[j] == 0 else box[0 if normal[j] > 0 else 1, j]
-        gap[j] = _gap(aim, j, x[j])
+        gap[j] = _gap(cells, aim, j, x[j])
         square += gap[j] ** 2
     return square
 
@@ -218,7 +208,7 @@ def _halved(cells: Cells, row: int, value: float, box: Floats, halves: Floats) -
     """Fills in the boxes around what a half-space has of the halves of a box, (2, 2, n), and returns how many there are."""
     normal, best, longest = cells.normals[row], 0, -1.0
     for j in range(len(normal)):
-        along_normal = abs(normal[j]) * (_s(cells, j, box[1, j]) - _s(cells, j, box[0, j]))
+        along_normal = abs(normal[j]) * (in_s(cells, j, box[1, j]) - in_s(cells, j, box[0, j]))
         if along_normal > longest:
             best, longest = j, along_normal
     count = 0
@@ -230,20 +220,19 @@ def _halved(cells: Cells, row: int, value: float, box: Floats, halves: Floats) -
 
 
 @njit(cache=True)
-def _distance(aim: Aim, box: Floats) -> float:
+def _distance(cells: Cells, aim: Aim, box: Floats) -> float:
     """Returns how far a box is from the aim, in s."""
     square = 0.0
     for j in range(box.shape[1]):
         q = min(max(aim.q[j], box[0, j]), box[1, j])
-        square += (_gap(aim, j, q) if q != aim.q[j] else 0.0) ** 2
+        square += (_gap(cells, aim, j, q) if q != aim.q[j] else 0.0) ** 2
     return np.sqrt(square)
 
 
 @njit(cache=True)
-def _gap(aim: Aim, j: int, x: float) -> float:
+def _gap(cells: Cells, aim: Aim, j: int, x: float) -> float:
     """Returns how far a position of a joint is from that of the aim, in s."""
-    offset = x - aim.q_star[j]
-    return (np.tan(offset / 2) if aim.revolute[j] else offset) - aim.s[j]
+    return in_s(cells, j, x) - aim.s[j]
 
 
 @njit(cache=True)
@@ -299,14 +288,14 @@ def _cell_at(
             for i in range(2):
                 far[i, j] = -1.0
                 if box[0, j] <= mine[i, j] <= box[1, j]:
-                    far[i, j] = np.sqrt(max(square - gap[j] ** 2 + _gap(aim, j, mine[i, j]) ** 2, 0.0))
+                    far[i, j] = np.sqrt(max(square - gap[j] ** 2 + _gap(cells, aim, j, mine[i, j]) ** 2, 0.0))
                     least, count = min(least, far[i, j]), count + 1
         there = 0
         for f in range(seen.many[0]):
             other[0], other[1] = np.maximum(mine[0], box[0]), np.minimum(mine[1], box[1])
             if _before(cells, seen.rows[f], seen.values[f], other, seen.parts[there]):
                 seen.rows[there], seen.values[there] = seen.rows[f], seen.values[f]
-                least, there = min(least, _distance(aim, seen.parts[there])), there + 1
+                least, there = min(least, _distance(cells, aim, seen.parts[there])), there + 1
         if least > best:
             best, parts, cell[:], keys[:] = least, count, mine, far
             faces.many[0] = there

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from certifier.model import Array
+from certifier.polytopes.simplex import dot
 from certifier.proof.partition import OBLIQUE, OPEN, PLANE
 
 FIRST = 1024
@@ -76,19 +77,10 @@ def locate(kinds: Array, values: Array, planes: Array, children: Array, normals:
     for i in range(len(X)):
         node = 0
         while kinds[node] >= 0:
-            at = along(normals[planes[node]], X[i]) if kinds[node] == OBLIQUE else X[i, kinds[node]]
+            at = dot(normals[planes[node]], X[i]) if kinds[node] == OBLIQUE else X[i, kinds[node]]
             node = children[node, 0 if at <= values[node] else 1]
         found[i] = node
     return found
-
-
-@njit(cache=True)
-def along(normal: Array, x: Array) -> float:
-    """Returns where a point, (k,), is along a normal."""
-    t = 0.0
-    for j in range(len(x)):
-        t += normal[j] * x[j]
-    return t
 
 
 @njit(cache=True)

@@ -21,7 +21,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from certifier.map.descent import along
 from certifier.map.oblique import MOST_JOINTS, cut_off
 from certifier.map.settle import CONTACTS, DONE, NARROW, TOUCH, Levels, joint_to_cut, middle, settle, turn
 from certifier.model import Array
@@ -29,6 +28,7 @@ from certifier.partition.bodies import Pair
 from certifier.partition.hulls import gaps
 from certifier.partition.search import NARROW_APART, NARROW_COARSE, NARROW_CUT
 from certifier.partition.sides import Proofs, room_for
+from certifier.polytopes.simplex import dot
 from certifier.proof.partition import OBLIQUE, OPEN, PLANE
 
 LOOKED_AT, MOSTLY = 16, 0.6
@@ -130,9 +130,8 @@ def advance(
             break
         looked += 1
         if kept.bounds[kept.held[0]].max() + needed > len(streams.pieces):
-            more = _streams(2 * len(streams.pieces))
-            for i in range(len(streams.pieces)):
-                more.pieces[i], more.counts[i], more.multipliers[i] = streams.pieces[i], streams.counts[i], streams.multipliers[i]
+            held, more = len(streams.pieces), _streams(2 * len(streams.pieces))
+            more.pieces[:held], more.counts[:held], more.multipliers[:held] = streams.pieces, streams.counts, streams.multipliers
             streams = more
         joint, cell, size = _tried(pairs, levels, work, cell, size, order, samples, proofs, first, kept, streams)
         if joint >= 0 and _cut(levels, work, cell, size, joint, order, samples):
@@ -252,18 +251,11 @@ def _cut_off(work: Work, cell: int, size: int, normal: Array, value: float, plan
     work.kinds[cell], work.values[cell], work.plane[cell], work.normals[cell] = OBLIQUE, value, cell, normal
     work.children[cell] = size, size + 1
     work.kinds[size], work.plane[size] = PLANE, plane
-    rest, end = size + 1, work.end[cell]
-    held = order[work.begin[cell] : end].copy()
-    at = end
-    for x in range(len(held) - 1, -1, -1):
-        if along(normal, samples[held[x]]) > value:
-            at -= 1
-            order[at] = held[x]
-    before = work.begin[cell]
-    for i in held:
-        if along(normal, samples[i]) <= value:
-            order[before] = i
-            before += 1
+    rest, begin, end = size + 1, work.begin[cell], work.end[cell]
+    places = np.empty(end - begin)
+    for x in range(begin, end):
+        places[x - begin] = dot(normal, samples[order[x]])
+    at = _parted(order, begin, places, value)
     work.kinds[rest], work.begin[rest], work.end[rest] = OPEN, at, end
     work.lower[rest], work.upper[rest], work.level[rest] = work.lower[cell], work.upper[cell], work.level[cell]
     work.contacts[rest], work.known[rest], work.waits[rest] = work.contacts[cell], work.known[cell], work.waits[cell]
@@ -280,7 +272,10 @@ def _cut(levels: Levels, work: Work, cell: int, size: int, joint: int, order: Ar
         work.level[cell] = 0
         return False
     work.kinds[cell], work.values[cell] = joint, value
-    below = _parted(order, samples, work.begin[cell], work.end[cell], joint, value)
+    places = np.empty(work.end[cell] - work.begin[cell])
+    for x in range(len(places)):
+        places[x] = samples[order[work.begin[cell] + x], joint]
+    below = _parted(order, work.begin[cell], places, value)
     for part in range(2):
         child = size + part
         work.children[cell, part], work.kinds[child], work.level[child] = child, OPEN, work.level[cell]
@@ -333,17 +328,22 @@ def _renumbered(pair: Pair, pieces: Array, first: int, length: int, to: Array) -
 
 
 @njit(cache=True)
-def _parted(order: Array, samples: Array, begin: int, end: int, joint: int, value: float) -> int:
-    """Moves the samples of a cell that are below a cut before the others, each in their order, and returns where the others begin."""
-    held = order[begin:end].copy()
+def _parted(order: Array, begin: int, places: Array, value: float) -> int:
+    """Moves the samples of a cell that are below a cut before the others, each in their order, and returns where the others begin.
+
+    Args:
+        begin: where the samples of the cell begin in the order.
+        places: of each of them, in the direction that is cut.
+    """
+    held = order[begin : begin + len(places)].copy()
     at = begin
-    for i in held:
-        if samples[i, joint] <= value:
-            order[at] = i
+    for i in range(len(held)):
+        if places[i] <= value:
+            order[at] = held[i]
             at += 1
     below = at
-    for i in held:
-        if samples[i, joint] > value:
-            order[at] = i
+    for i in range(len(held)):
+        if places[i] > value:
+            order[at] = held[i]
             at += 1
     return below

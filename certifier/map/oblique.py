@@ -12,12 +12,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from certifier.map.descent import along
 from certifier.map.settle import configurations
 from certifier.model import Array
 from certifier.partition.bodies import LEAST, NO_PLANE, SEPARATED, Pair, separated
 from certifier.partition.hulls import gaps
 from certifier.partition.sides import Proofs
+from certifier.polytopes.simplex import dot
 
 MOST_JOINTS = 5
 """Volumes that more joints move take too many pieces in cells of the size at which faces are worth their time."""
@@ -65,7 +65,7 @@ def cut_off(pair: Pair, lower: Array, upper: Array, samples: Array) -> tuple[boo
     fitted = _fitted(J, mid, half, X, gap, normal)
     places, nearest = np.empty(len(X)), np.inf
     for i in range(len(X)):
-        places[i] = along(normal, X[i])
+        places[i] = dot(normal, X[i])
         if gap[i] <= 0:
             nearest = min(nearest, places[i])
     if nearest == np.inf:  # nothing is known to touch
@@ -76,7 +76,7 @@ def cut_off(pair: Pair, lower: Array, upper: Array, samples: Array) -> tuple[boo
     for _ in range(TRIES if fitted else 0):
         before = 0
         for i in range(len(samples)):
-            before += along(normal, samples[i]) <= value
+            before += dot(normal, samples[i]) <= value
         near = np.flatnonzero(places <= value)[:STARTS]
         if before < WORTH * len(samples) or len(near) < 2:
             break
@@ -92,7 +92,7 @@ def cut_off(pair: Pair, lower: Array, upper: Array, samples: Array) -> tuple[boo
         # The face moves to before what touches, or to before all of what no plane separates.
         where, touch = np.empty(len(failed)), gaps(pair.a, pair.b, Y[failed]) <= 0
         for i in range(len(failed)):
-            where[i] = along(normal, Y[failed[i]])
+            where[i] = dot(normal, Y[failed[i]])
         value = min(value, (where[touch] if touch.any() else where).min()) - BACK * length
     none = np.zeros(0)
     nothing = Proofs(none.astype(np.int8), none.astype(np.int16), none.astype(np.int16), none.astype(np.float32), np.zeros(3, np.int64))

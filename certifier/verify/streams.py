@@ -73,10 +73,11 @@ class Cuts:
         if not (np.isfinite(proof.cuts).all() and np.isfinite(proof.planes).all()):
             raise malformed(proof, "a cut or a plane is not finite")
         oblique = np.flatnonzero(nodes == OBLIQUE)
-        if isinstance(proof, PairMap) and proof.normals.shape != (len(oblique), proof.scene.n):
-            raise malformed(proof, f"the normals of {len(oblique)} oblique cuts are {proof.normals.shape}")
-        if isinstance(proof, PairMap) and not np.isfinite(proof.normals).all():
-            raise malformed(proof, "the normal of an oblique cut is not finite")
+        if isinstance(proof, PairMap):
+            if proof.normals.shape != (len(oblique), proof.scene.n):
+                raise malformed(proof, f"the normals of {len(oblique)} oblique cuts are {proof.normals.shape}")
+            if not np.isfinite(proof.normals).all():
+                raise malformed(proof, "the normal of an oblique cut is not finite")
         if not (nodes[oblique + 1] == PLANE).all():
             raise malformed(proof, "the lower part of an oblique cut is no cell with a plane")
         self._proof, self._play = proof, play

@@ -175,7 +175,7 @@ def test_two_hundred_clients_while_the_workers_compute(service: Loaded) -> None:
 
 
 LONG_SECONDS, SETTLED_SECONDS = 900.0, 300.0
-"""So long the clients ask while memory is looked at, and after so long every cache is full."""
+"""The clients ask for LONG_SECONDS. After SETTLED_SECONDS every cache is full, and from then on memory is looked at."""
 LOOK_SECONDS = 10.0
 FEWER_POSTS = 0.004
 """The jobs of 15 minutes are to be fewer than a project may have."""
