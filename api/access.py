@@ -216,6 +216,7 @@ class Keyring:
                     log.warning("when keys were used could not be noted; trying again at their next use: %s", error)
                     await asyncio.sleep(NOTES_SECONDS)
                     continue
+                self._used -= ids
                 for id in ids & self._known.keys():
                     known = self._known[id]
                     self._known[id] = replace(known, held=replace(known.held, last_used_at=now))

@@ -34,7 +34,7 @@ def test_a_visit_from_a_job_to_a_plan(page: Any, url: str, planar: Scene, client
     # A job, to its end, without a reload.
     job_id = submit(page, url)
     page.evaluate("window.loadedOnce = true")
-    page.locator(".badge.succeeded").wait_for(timeout=60_000)
+    page.locator(".badge.succeeded").wait_for(timeout=240_000)
     page.get_by_text("The job has succeeded").wait_for()
     assert page.evaluate("window.loadedOnce"), "the page was not loaded again"
     regions = {region["id"] for region in client.get(f"/v1/regions?job={job_id}").json()["regions"]}
