@@ -23,6 +23,7 @@ def certifying(rows: Sequence[PairRow]) -> list[HeldWork]:
             work=PAIRS,
             iteration=held[0].iteration,
             pairs=sorted({row.pair_index for row in held}),
+            since=held[0].lease_since,
             until=held[0].lease_until,
         )
         for held in claims.values()
@@ -32,10 +33,24 @@ def certifying(rows: Sequence[PairRow]) -> list[HeldWork]:
 def doing(step: StepRow) -> HeldWork:
     """Describes a step that is held."""
     return HeldWork(
-        job=step.job_id, process=step.worker or "", work=SAID.get(step.kind, step.kind), iteration=None, pairs=[], until=step.lease_until
+        job=step.job_id,
+        process=step.worker or "",
+        work=SAID.get(step.kind, step.kind),
+        iteration=None,
+        pairs=[],
+        since=step.lease_since,
+        until=step.lease_until,
     )
 
 
 def deciding(job: JobRow) -> HeldWork:
     """Describes the decision about a job that somebody is making."""
-    return HeldWork(job=job.id, process=job.coordinator or "", work=DECIDE, iteration=None, pairs=[], until=job.coordinator_until)
+    return HeldWork(
+        job=job.id,
+        process=job.coordinator or "",
+        work=DECIDE,
+        iteration=None,
+        pairs=[],
+        since=job.coordinator_since,
+        until=job.coordinator_until,
+    )

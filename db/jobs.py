@@ -269,7 +269,7 @@ def next_turn(job: JobRow, action: dict[str, Any]) -> None:
     """Says what the job waits for from now on, which ends the turn of its coordinator. The caller holds the job's lock."""
     job.turn += 1
     job.action = action
-    job.coordinator = job.coordinator_parent = job.coordinator_until = None
+    job.coordinator = job.coordinator_parent = job.coordinator_since = job.coordinator_until = None
     job.coordinator_attempts = job.coordinator_deaths = 0
 
 
@@ -330,11 +330,11 @@ def is_coordinated(job: JobRow, now: datetime) -> bool:
     return leases.is_alive(job.coordinator) is not False
 
 
-def coordinate(job: JobRow, until: datetime) -> None:
-    """Says that this process computes the job's next transition. The caller holds the job's lock."""
+def coordinate(job: JobRow, now: datetime, seconds: float) -> None:
+    """Says that this process computes the job's next transition, for at most this many seconds. The caller holds the job's lock."""
     job.coordinator_deaths = _deaths(job)
     job.coordinator, job.coordinator_parent = leases.this_worker(), leases.parent_worker()
-    job.coordinator_until = until
+    job.coordinator_since, job.coordinator_until = now, now + timedelta(seconds=seconds)
     job.coordinator_attempts += 1
 
 

@@ -97,7 +97,7 @@ def _started(pid: int) -> str | None:
 
 def take(session: Session, model: type[PairRow] | type[StepRow], ids: Sequence[int], *, seconds: float) -> str:
     """Claims open rows, counts the attempt, and returns the lease's token. The caller holds the lock of their job."""
-    token = str(uuid4())
+    token, now = str(uuid4()), clock.now(session)
     transition(
         session,
         model,
@@ -107,7 +107,8 @@ def take(session: Session, model: type[PairRow] | type[StepRow], ids: Sequence[i
         worker=this_worker(),
         parent=parent_worker(),
         lease_token=token,
-        lease_until=clock.now(session) + timedelta(seconds=seconds),
+        lease_since=now,
+        lease_until=now + timedelta(seconds=seconds),
     )
     return token
 

@@ -137,6 +137,8 @@ class Leased:
     """The process that forked this worker, in the same form."""
     lease_token: Mapped[str | None] = mapped_column(String(36))
     """The holder is the process that knows the token. Every claim makes a new one."""
+    lease_since: Mapped[datetime | None]
+    """When the holder took the row. Renewing the lease does not change it."""
     lease_until: Mapped[datetime | None]
 
 
@@ -286,6 +288,8 @@ class JobRow(Owned, Base):
     """How many transitions of the growth have been saved. A coordinator saves only onto the turn it started from."""
     coordinator: Mapped[str | None]
     """The process that is computing the next transition (``host:pid:start``)."""
+    coordinator_since: Mapped[datetime | None]
+    """When it began."""
     coordinator_until: Mapped[datetime | None]
     """Until this time that process is believed to be at work."""
     coordinator_attempts: Mapped[int] = mapped_column(default=0)

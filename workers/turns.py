@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
-from datetime import timedelta
 from functools import partial
 from typing import Any
 
@@ -68,7 +67,7 @@ class _Rows:
             report = None if job.action is None else kind.report(session, job, state)
             if jobs.is_coordinated(job, now) or (job.action is not None and report is None):
                 return None
-            jobs.coordinate(job, now + timedelta(seconds=COORDINATION_SECONDS))
+            jobs.coordinate(job, now, COORDINATION_SECONDS)
             return Turn(job.id, job.traceparent, kind, job.turn, job.scene_id, job.options, job.deadline_at, state, report)
 
     def decide(self, turn: Turn) -> Any:

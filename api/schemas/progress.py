@@ -36,6 +36,9 @@ class HeldWork(BaseModel):
     )
     iteration: int | None = Field(description="Iteration of the pairs; null where the work is no pairs.")
     pairs: list[int] = Field(description="Indices of the pairs that it certifies, ascending; those that are done already are left out.")
+    since: datetime | None = Field(
+        description="When the process took the work; null for work that was taken before a database of revision 0041."
+    )
     until: datetime | None = Field(description="Without a sign of life until then, the work is given to another process.")
 
 
@@ -53,6 +56,7 @@ class JobWorkers(BaseModel):
                             "work": "pairs",
                             "iteration": 3,
                             "pairs": [4, 7],
+                            "since": "2026-11-23T11:59:48Z",
                             "until": "2026-11-23T12:00:30Z",
                         }
                     ]

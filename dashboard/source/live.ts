@@ -16,11 +16,13 @@ export function connected(is: boolean): void {
 
 /** Times that run: <dd data-since="..."> shows how long ago that is, to the second. */
 function clocks(): void {
-  for (const clock of document.querySelectorAll<HTMLElement>("[data-since]")) {
-    const seconds = Math.max(0, Math.round((Date.now() - Date.parse(clock.dataset.since!)) / 1000));
-    const [hours, minutes] = [Math.floor(seconds / 3600), Math.floor(seconds / 60) % 60];
-    clock.textContent = seconds < 100 ? `${seconds} s` : hours ? `${hours} h ${minutes} min` : `${minutes} min ${seconds % 60} s`;
-  }
+  document.querySelectorAll<HTMLElement>("[data-since]").forEach(tick);
+}
+
+export function tick(clock: HTMLElement): void {
+  const seconds = Math.max(0, Math.round((Date.now() - Date.parse(clock.dataset.since!)) / 1000));
+  const [hours, minutes] = [Math.floor(seconds / 3600), Math.floor(seconds / 60) % 60];
+  clock.textContent = seconds < 100 ? `${seconds} s` : hours ? `${hours} h ${minutes} min` : `${minutes} min ${seconds % 60} s`;
 }
 
 let asked = 0;

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from datetime import timedelta
+from datetime import datetime, timedelta
 
 import pytest
 from fastapi.testclient import TestClient
@@ -43,7 +43,7 @@ def busy(database: Database, crew: dict[str, str]) -> str:
     with database.write() as session:
         job = a_running_job(session)
         assert work.claim(session, job.id, lease_seconds=60, batch_seconds=0.5) is not None
-        job.coordinator, job.coordinator_until = CONTROL, utcnow() + timedelta(seconds=60)
+        job.coordinator, job.coordinator_since, job.coordinator_until = CONTROL, utcnow(), utcnow() + timedelta(seconds=60)
         return job.id
 
 
@@ -53,7 +53,11 @@ def key_of(database: Database, project: str, scope: Scope = Scope.ADMIN) -> dict
     return {"Authorization": f"Bearer {key}"}
 
 
-def test_the_list_says_what_each_worker_does(client: TestClient, crew: dict[str, str], busy: str) -> None:
+def test_the_list_says_what_each_worker_does_and_since_when(
+    client: TestClient, crew: dict[str, str], database: Database, busy: str
+) -> None:
+    with database.read() as session:
+        began = jobs.get(session, busy).created_at
     listed = {worker["kind"]: worker for worker in client.get("/v1/workers").json()["workers"]}
     solve, control = listed["solve"], listed["control"]
     assert (solve["id"], solve["processes"], solve["cores"], solve["memory_bytes"]) == (crew["solve"], 4, 8, 2**34)
@@ -62,6 +66,9 @@ def test_the_list_says_what_each_worker_does(client: TestClient, crew: dict[str,
     (pairs,), (decision,) = solve["work"], control["work"]
     assert (pairs["job"], pairs["work"], pairs["pairs"], pairs["process"]) == (busy, "pairs", [0], CONTROL)
     assert (decision["job"], decision["work"]) == (busy, "decide")
+    for piece in (pairs, decision):
+        since, until = datetime.fromisoformat(piece["since"]), datetime.fromisoformat(piece["until"])
+        assert began <= since <= utcnow() < until
     assert client.get(f"/v1/workers/{crew['solve'][:8]}").json() == solve
     (of_job, _) = client.get(f"/v1/jobs/{busy}/workers").json()["workers"]
     assert of_job == pairs, "both routes say it alike"

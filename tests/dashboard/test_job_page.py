@@ -103,7 +103,8 @@ def test_the_page_finds_out_who_works_without_an_event(page: Any, url: str, data
     page.get_by_text("Queued: no worker.").wait_for()
     with database.write() as session:
         assert work.claim(session, job.id, lease_seconds=60, batch_seconds=0.5) is not None
-    page.get_by_text("Looking for a starting region around the seed").wait_for()
+    page.locator(".workers li", has_text=re.compile(r"Looking for a starting region around the seed, for \d s")).wait_for()
+    page.locator(".workers li", has_text=re.compile(r"around the seed, for [1-9]\d? s")).wait_for()
     page.locator(".title .badge", has_text="working").wait_for()
 
 

@@ -27,6 +27,9 @@ def test_the_page_shows_what_workers_do_and_pauses_them(page: Any, url: str, bus
     assert "1 of 4" in row.text_content()
     assert "expiry failed: OverflowError" in row.text_content()
     assert row.get_by_role("link", name=busy[:8]).get_attribute("href") == f"/jobs/{busy}"
+    (since,) = row.get_by_role("cell").nth(4).locator("time").all()
+    began, now = page.evaluate("time => [Date.parse(time.dateTime), Date.now()]", since.element_handle())
+    assert now - 60_000 < began <= now, "the pair is held since a moment ago"
     assert barriers(page) == []
     asked: list[str] = []
     page.once("dialog", lambda dialog: (asked.append(dialog.message), dialog.dismiss()))

@@ -120,7 +120,7 @@ def test_a_job_works_while_somebody_decides(db: Database) -> None:
     with db.write() as session:
         crew(session, SOLVER, CONTROL)
         job = a_job(session)
-        jobs.coordinate(job, clock.now(session) + timedelta(seconds=60))
+        jobs.coordinate(job, clock.now(session), 60)
         session.flush()
         assert does(session, job) == ["working"]
 

@@ -256,15 +256,17 @@ def test_a_renewed_lease_does_not_run_out(db: Database) -> None:
     held = claim(db, job_id)
     assert held is not None
     with db.read() as session:
-        before = session.scalars(select(PairRow)).one().lease_until
+        row = session.scalars(select(PairRow)).one()
+        before, since = row.lease_until, row.lease_since
     with leases.kept(db, PairRow, held.token, seconds=0.2, job_states=[JobState.RUNNING]):
         until = utcnow() + timedelta(seconds=10)
         while utcnow() < until:
             with db.read() as session:
-                after = session.scalars(select(PairRow)).one().lease_until
+                row = session.scalars(select(PairRow)).one()
             assert before is not None
-            assert after is not None
-            if after != before:
+            assert row.lease_until is not None
+            if row.lease_until != before:
+                assert since == row.lease_since, "it began when it was claimed"
                 return
             time.sleep(0.05)
     raise AssertionError("the lease was never renewed")

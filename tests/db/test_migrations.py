@@ -8,7 +8,7 @@ import pytest
 from sqlalchemy import inspect, select, text
 
 from certifier.errors import CirisError
-from db import jobs, migrate, pairs, regions, scenes
+from db import clock, jobs, migrate, pairs, regions, scenes, work
 from db.models import IterationRow
 from db.session import Database
 from tests.db.builders import a_job, a_running_job, add_iteration, add_region, all_pairs
@@ -77,6 +77,27 @@ def test_jobs_and_their_pairs_survive_the_way_down_and_up(empty_database_url: st
         assert (job.action, jobs.growth(session, job_id)) == (certify, {"next": 1})
         (row,) = session.scalars(select(IterationRow))
         assert (row.action["hard"], row.action["polytope"]["d"], row.failures, row.faces) == ([], [1.0, 1.0], 1, 2)
+    database.close()
+
+
+def test_what_is_held_on_the_way_up_is_held_since_nobody_knows_when(empty_database_url: str) -> None:
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    with database.write() as session:
+        job = a_running_job(session, pair_count=1)
+        jobs.coordinate(job, clock.now(session), 60)
+        session.flush()
+        assert work.claim(session, job.id, lease_seconds=60, batch_seconds=0.5) is not None
+        job_id = job.id
+    with database.read() as session:
+        (before,) = all_pairs(session, job_id)
+        assert before.lease_since is not None
+        assert jobs.get(session, job_id).coordinator_since is not None
+    database = there_and_back(database, empty_database_url, "0040")
+    with database.read() as session:
+        (after,) = all_pairs(session, job_id)
+        assert (after.worker, after.lease_token, after.lease_until) == (before.worker, before.lease_token, before.lease_until)
+        assert (after.lease_since, jobs.get(session, job_id).coordinator_since) == (None, None)
     database.close()
 
 

@@ -1,5 +1,6 @@
 // Who does what for the job at this moment.
 import type { HeldWork } from "../common/schema";
+import { tick } from "../live";
 import { plural } from "./outcomes";
 import { address } from "./route";
 import { stepOf } from "./steps";
@@ -19,6 +20,12 @@ export function Workers({ store, subject }: { store: JobStore; subject: string }
             <li key={worker.process + worker.pairs.join()}>
               <code title={worker.process}>{worker.process.split(":").slice(0, 2).join(":")}</code>{" "}
               <span>{worker.work === "pairs" ? <Certifies store={store} worker={worker} /> : stepOf(worker.work, subject)}</span>
+              {worker.since && (
+                <>
+                  {", for "}
+                  <span ref={(clock) => void (clock && tick(clock))} data-since={worker.since} title={`since ${new Date(worker.since).toLocaleString()}`} />
+                </>
+              )}
             </li>
           ))}
         </ul>
