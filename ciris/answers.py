@@ -557,6 +557,8 @@ class Map:
     """Seconds since the start, and the coverage by then."""
     stored: StoredMap | None
     """What is verified and stored; None before the job has ended, and where nothing is proved."""
+    former: str | None = None
+    """The job whose map was taken over, as far as it holds here; None where there was none."""
 
     def __bool__(self) -> bool:
         return self.outcome is Outcome.CERTIFIED

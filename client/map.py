@@ -64,7 +64,7 @@ def _here(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
         raise CirisError("option", "is only for jobs of the service", field="--asked", hint="leave out it or --local")
     from certifier.jobs.map import grow_map, in_s, ways_of
 
-    former = None if args.former is None else _former(args.former)
+    former = None if args.former in (None, "none") else _former(args.former)
 
     def tell(_: str, told: dict[str, Any]) -> None:
         screen.status(_said(told["coverage"], told["error"], told["cells"]), told["coverage"])
@@ -142,6 +142,7 @@ def _written(client: Client, job: str, scene: Document, out: str | None) -> dict
         "seconds": found["seconds"],
         "ended": found["ended"],
         "given_up": found["given_up"],
+        "former": found["former"],
         "at": [] if stored is None else stored["at"],
         "paths": [] if stored is None else stored["paths"],
         "proof": None if path is None else str(path),
@@ -158,6 +159,8 @@ def _print(document: dict[str, Any]) -> None:
         print(f"path[{i}]: {output.percent(share)} of it proved")
     if document["given_up"]:
         print(f"{document['given_up']} pieces of work were given up: the verifier refused what they found")
+    if document.get("former"):
+        print(f"begun with the map of job {document['former'][:8]} (anew: --former none)")
     if document["ended"] in ENDS:
         print(f"ended: {ENDS[document['ended']]}")
     elif document["ended"] is None:

@@ -6,7 +6,7 @@ what they found when the round is over. So another process that leads next can r
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from sqlalchemy import delete, func, insert, select
@@ -14,8 +14,11 @@ from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
 from db import leases, proofs
-from db.models import JobRow, MapPieceRow, StepRow
+from db.models import JobRow, MapPairRow, MapPieceRow, StepRow
 from db.states import ACCEPT, PIECE, STEP, StepState, unfinished
+
+MOST_CONTENTS = 10_000
+"""At most this many pairs are looked for in other maps; a query has no room for many more."""
 
 
 def post(session: Session, job: JobRow, tasks: Sequence[bytes]) -> None:
@@ -113,6 +116,24 @@ def latest(session: Session, scene_id: str) -> str | None:
     mine = (JobRow.scene_id == scene_id, *_STORED, StepRow.data.is_not(None))
     query = select(JobRow.id).join(StepRow, StepRow.job_id == JobRow.id).where(*mine)
     return session.scalar(query.order_by(StepRow.id.desc()).limit(1))
+
+
+def keep_contents(session: Session, job_id: str, cells: Mapping[str, int]) -> None:
+    """Keeps how many cells the map of a job has with a plane, by what their pairs are about (certifier.proof.sub_scene)."""
+    if cells:
+        rows = [{"job_id": job_id, "content": content, "cells": number} for content, number in cells.items()]
+        session.execute(insert(MapPairRow), rows)
+
+
+def knows_most(session: Session, project: str, contents: Sequence[str]) -> str | None:
+    """Returns the id of the project's job whose map has most cells with a plane of some pairs; None where there is none.
+
+    Args:
+        contents: what the pairs are about.
+    """
+    mine = JobRow.project == project, MapPairRow.content.in_(contents[:MOST_CONTENTS])
+    query = select(MapPairRow.job_id).join(JobRow, JobRow.id == MapPairRow.job_id).where(*mine).group_by(MapPairRow.job_id)
+    return session.scalar(query.order_by(func.sum(MapPairRow.cells).desc(), MapPairRow.job_id).limit(1))
 
 
 def to_take_over(session: Session, job_id: str, kind: str, former: str) -> str:

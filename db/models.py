@@ -464,6 +464,17 @@ class MapPieceRow(Base):
     """What certifier.map.packed.pack_entries() returned."""
 
 
+class MapPairRow(Base):
+    """What a stored map proves of a pair: how many cells its trees have with a plane. Other maps begin with what it proves."""
+
+    __tablename__ = "map_pairs"
+
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
+    content: Mapped[str] = mapped_column(String(16), primary_key=True, index=True)
+    """The beginning of the hash of what the pair is about (certifier.proof.sub_scene)."""
+    cells: Mapped[int]
+
+
 class ProofRow(Base):
     """This row holds a proof file, addressed by its content."""
 

@@ -20,6 +20,7 @@ from certifier.model import Scene
 from certifier.names import MAX_NAME
 from certifier.options import read
 from certifier.outcome import Outcome
+from certifier.proof.sub_scene import contents_of
 from db import jobs, maps, questions, steps
 from db.models import JobRow
 from db.session import Database
@@ -30,8 +31,11 @@ from jobs.fields import model_of
 from jobs.kind import Done, Kind, Turn, report_of
 from jobs.mapping import Account, accept, lead, piece
 from jobs.request import JobRequest
+from jobs.scenes import load_scene
 from workers.app import send_work
 
+NONE = "none"
+"""As the former map: nothing is taken over."""
 GRACE = timedelta(seconds=30)
 """The process that leads a job ends at the deadline by itself. Where it has not after this time, it is gone."""
 
@@ -53,13 +57,20 @@ class MapRequest(JobRequest):
         None,
         max_length=MAX_NAME,
         description="Id of a job that has grown a map, or its first characters. What that map proves of the same bodies is taken over, "
-        "such as the robot's own pairs.",
+        "such as the robot's own pairs. By default it is the map of the project that proves most about the scene's pairs, and the job's "
+        f"options say which one that is. With `{NONE}` nothing is taken over.",
     )
 
 
 @dataclass(frozen=True)
 class Lead:
-    """An action: grow the map until it ends, or until other jobs go first."""
+    """An action: grow the map until it ends, or until other jobs go first.
+
+    Attributes:
+        contents: what the pairs are about of which another map is to be taken over, if there is one.
+    """
+
+    contents: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -88,7 +99,8 @@ class Map(Kind):
             for j, q in enumerate(path):
                 check_positions(scene, q, f"options.paths[{i}][{j}]")
         ways_of(scene, given["paths"])  # refuses waypoints that are whole turns away
-        return {**asdict(read(MapOptions, given, "options")), "former": None if body.former is None else _former(body.former, db)}
+        former = body.former if body.former in (None, NONE) else _former(body.former, db)
+        return {**asdict(read(MapOptions, given, "options")), "former": former}
 
     def completed(self, options: dict[str, Any], scene_id: str, scene: Scene, db: Database) -> dict[str, Any]:
         """Has the job begin with what was asked, if it is to: the configurations are in its options, so these say what the map is."""
@@ -100,6 +112,8 @@ class Map(Kind):
                 raise error
             case Ended(reason=str() as reason, reached=reached):
                 return Finish(Outcome.CERTIFIED if reached else Outcome.INCONCLUSIVE, ENDS[reason])
+            case None if turn.options.get("former") is None:
+                return Lead(tuple(contents_of(load_scene(turn.scene_id)).values()))
             case _:
                 return Lead()
 
@@ -112,7 +126,9 @@ class Map(Kind):
             jobs.next_turn(job, jobs.finishing(decision.outcome, decision.reason))
             _store(session, job, afterwards)
             return True
-        former, digest = job.options.get("former"), None
+        if decision.contents and (known := maps.knows_most(session, job.project, decision.contents)):
+            job.options = {**job.options, "former": known}
+        former, digest = former_of(job), None
         if former is not None:
             try:
                 digest = maps.to_take_over(session, job.id, LEAD, former)
@@ -138,7 +154,8 @@ class Map(Kind):
             _store(session, job, afterwards)
 
     def result(self, session: Session, job: JobRow) -> dict[str, Any]:
-        """Returns how far the map is (``account``, a jobs.mapping.Account), what is stored of it (``map``), and why it ended (``ended``).
+        """Returns how far the map is (``account``, a jobs.mapping.Account), what is stored of it (``map``), why it ended (``ended``), and
+        the job whose map is taken over (``former``).
 
         Each is None as long as there is none.
         """
@@ -148,6 +165,7 @@ class Map(Kind):
             "account": None if known is None else stored.value(Account, known),
             "map": None if found is None else found[0],
             "ended": _ended(session, job),
+            "former": former_of(job),
         }
 
 
@@ -173,6 +191,12 @@ def _former(job_id: str, db: Database) -> str:
         if job.kind != Map.name or maps.accepted(session, job.id) is None:
             raise CirisError("map_not_found", f"the {job.kind} job {job.id} is {job.state} and has no map", field="former", hint=hint)
         return job.id
+
+
+def former_of(job: JobRow) -> str | None:
+    """Returns the id of the job whose map is taken over; None where nothing is."""
+    former: str | None = job.options.get("former")
+    return None if former == NONE else former
 
 
 def _ended(session: Session, job: JobRow) -> str | None:

@@ -7,6 +7,7 @@ before the next one begins. So a process that leads after another one died repea
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -28,6 +29,8 @@ from certifier.map.packed import Entry, pack_entries, pack_tasks, unpack_entries
 from certifier.map.pair import Found
 from certifier.model import Scene
 from certifier.proof.map import MapProof
+from certifier.proof.partition import PLANE
+from certifier.proof.sub_scene import contents_of
 from certifier.verify.map import verify_map
 from ciris.free_set import FreeSet
 from db import clock, events, jobs, leases, maps, proofs, steps, workers
@@ -300,7 +303,8 @@ def accept(claim: steps.Claim, scene: Scene) -> Done:
         for data in found.values():
             for entry in unpack_entries(scene, data):
                 trees.tree(entry.pairs).take(entry.nodes, entry.found)
-    proof = trees.proof().to_bytes()
+    together = trees.proof()
+    proof, cells = together.to_bytes(), _cells_of(together)
     statement, file = verify_map(proof), _free_set_of(proof)
     states = states_of(trees, in_s(scene, options.at))
     report = {
@@ -315,10 +319,20 @@ def accept(claim: steps.Claim, scene: Scene) -> Done:
 
     def save(session: Any, _: JobRow) -> None:
         steps.keep_proof(session, claim, proof)
+        maps.keep_contents(session, claim.job_id, cells)
         if file is not None:
             maps.put(session, claim.step_id, file)
 
     return Done(report, save)
+
+
+def _cells_of(proof: MapProof) -> Counter[str]:
+    """Returns how many cells of a map have a plane, by what their pairs are about."""
+    contents, cells = contents_of(proof.scene), Counter[str]()
+    for pairs, part in zip(proof.pairs, proof.maps, strict=True):
+        for pair in pairs:
+            cells[contents[pair]] += int(np.count_nonzero(part.nodes == PLANE))
+    return +cells
 
 
 def _free_set_of(proof: bytes) -> bytes | None:

@@ -55,7 +55,7 @@ def get_job_map(job_id: JobGiven, db: Db) -> JobMap:
             "given_up": known.given_up,
             "curve": known.curve,
         }
-    return JobMap.model_validate({**_ended(job), **told, "ended": found["ended"], "stored": found["map"]})
+    return JobMap.model_validate({**_ended(job), **told, "ended": found["ended"], "former": found["former"], "stored": found["map"]})
 
 
 @router.get("/{job_id}/map/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})

@@ -60,4 +60,8 @@ class JobMap(BaseModel):
     looked_at: int = Field(description="Number of cells that were looked at until now.")
     given_up: int = Field(description="Number of pieces of work that were given up, because the verifier refused what they found.")
     curve: list[tuple[float, float]] = Field(description="Seconds since the start, and what was proved by then.")
+    former: str | None = Field(
+        description="Id of the job whose map was taken over, as far as it holds here; null where there was none.",
+        examples=["1f9b2a7c-5d3e-4f60-8a91-c2b7d4e6f801"],
+    )
     stored: StoredMap | None = Field(description="The map, once its proof is verified and stored; null before.")

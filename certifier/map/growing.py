@@ -19,7 +19,7 @@ from certifier.map.trees import Pairs, Plan
 from certifier.model import Array, Scene
 from certifier.proof import limits
 from certifier.proof.map import MapProof, PairMap
-from certifier.proof.partition import OBLIQUE, PLANE
+from certifier.proof.partition import OBLIQUE, PLANE, STREAMS
 
 HELD, FIRST, MOST_BATCHES = 4000, 8000, 16
 """HELD samples say what is proved; FIRST ones say where work is, at first. At most MOST_BATCHES times as many are drawn for that."""
@@ -34,6 +34,8 @@ TASK = 64
 """A task begins with at most this many cells."""
 FULL = 0.9
 """A map ends with this part of the bytes that the verifier reads."""
+TAKEN_OVER = 0.6
+"""At most this part of them comes from a former map."""
 DEMAND = 1000.0
 """A configuration that was asked for weighs as much as this many samples."""
 HAIR = 1e-8
@@ -133,6 +135,12 @@ class Tree:
         self.found.append(found.proved)
 
 
+def _some(former: MapProof) -> dict[str, PairMap]:
+    """Returns the maps of a former map by what they are about, as many as leave room for new cells."""
+    sizes = np.cumsum([sum(getattr(part, name).nbytes for name in (*STREAMS, "normals")) for part in former.maps])
+    return {part.scene.hash: part for part, size in zip(former.maps, sizes, strict=True) if size <= TAKEN_OVER * limits.UNPACKED_BYTES}
+
+
 class Trees:
     """The trees of a map of a scene.
 
@@ -146,7 +154,7 @@ class Trees:
 
     def __init__(self, scene: Scene, former: MapProof | None = None) -> None:
         self.scene, self.trees, self.taken_over = scene, dict[Pairs, Tree](), list[Pairs]()
-        self._former = {} if former is None else {part.scene.hash: part for part in former.maps}
+        self._former = {} if former is None else _some(former)
 
     def tree(self, pairs: Pairs) -> Tree:
         """Returns the tree of some pairs, a new one if there is none."""

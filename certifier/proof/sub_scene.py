@@ -66,6 +66,11 @@ def sub_scene(scene: Scene, pairs: Sequence[Pair]) -> SubScene:
     return SubScene(found, np.array(positions))
 
 
+def contents_of(scene: Scene) -> dict[Pair, str]:
+    """Returns what each pair of a scene is about: the first 16 hexadecimal digits of its scene's hash."""
+    return {pair: sub_scene(scene, [pair]).scene.hash[:16] for pair in scene.pairs}
+
+
 def way(scene: Scene, body: str) -> list[str]:
     """Returns the bodies from the world to a body, both included."""
     found = [body]

@@ -242,7 +242,8 @@ class Service:
         """Proves as much as possible of the free configurations of a scene, and waits for it. The job goes on if the wait is interrupted.
 
         Args:
-            former: a job that has grown a map. What it proves of the same bodies is taken over.
+            former: a job that has grown a map. What it proves of the same bodies is taken over. By default it is the one that proves most
+                about the scene's pairs; with ``"none"``, nothing is taken over.
 
         Raises:
             CirisError: what was refused, or what went wrong.

@@ -66,7 +66,8 @@ def add(verbs: Any) -> None:
     mapped.add_argument(
         "--former",
         metavar="MAP",
-        help="take over what this map proves of the same bodies, such as the robot's own: the id of a job; with --local, a proof file",
+        help="take over what this map proves of the same bodies, such as the robot's own: the id of a job; with --local, a proof file; "
+        "default: the service's map that proves most of them; none takes over nothing",
     )
     mapped.add_argument("--out", metavar="FILE", help="new file for the map; default: one in this directory, named after scene and map")
     mapped.add_argument("--local", action="store_true", help="grow the map in this process, without a service")

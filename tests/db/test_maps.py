@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from sqlalchemy import select
 
-from db import jobs, maps, steps
-from db.models import StepRow
+from db import jobs, maps, projects, steps
+from db.models import DEFAULT_PROJECT, StepRow
 from db.session import Database
 from db.states import ACCEPT, LEAD, StepState
 from jobs.map import Map
@@ -52,3 +52,23 @@ def test_a_job_that_is_stopped_in_its_first_round_has_a_map(db: Database) -> Non
 
 def test_a_job_that_has_found_nothing_has_no_map(db: Database) -> None:
     assert stopped(db, kept=0, done=0)[1] == []
+
+
+def test_the_map_of_the_project_that_proves_most_of_some_pairs_is_found(db: Database) -> None:
+    jobs_of: dict[str, list[str]] = {}
+    with db.write() as session:
+        projects.add(session, "others")
+    for project, maps_of in ((DEFAULT_PROJECT, [{"a": 5, "b": 1}, {"a": 1, "c": 7}]), ("others", [{"a": 50}])):
+        with db.of(project).write() as session:
+            scene = a_scene(session)
+            made = [jobs.create(session, kind="map", scene_id=scene.id, options={})[0].id for _ in maps_of]
+            for job_id, cells in zip(made, maps_of, strict=True):
+                maps.keep_contents(session, job_id, cells)
+            jobs_of[project] = made
+    first, second = jobs_of[DEFAULT_PROJECT]
+    with db.read() as session:
+        found = {wanted: maps.knows_most(session, DEFAULT_PROJECT, list(wanted)) for wanted in ("a", "ab", "ac", "d", "")}
+        assert found == {"a": first, "ab": first, "ac": second, "d": None, "": None}
+        assert maps.knows_most(session, "others", ["a", "b"]) == jobs_of["others"][0]
+        many = [f"{i:016x}" for i in range(3 * maps.MOST_CONTENTS)]
+        assert maps.knows_most(session, DEFAULT_PROJECT, many) is None

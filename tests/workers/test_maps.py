@@ -22,7 +22,7 @@ from certifier.pair.collisions import in_collision
 from certifier.proof.map import MapProof
 from certifier.verify.file import verify_file
 from ciris.free_set import FreeSet
-from db import jobs, scenes
+from db import jobs, projects, scenes
 from db.models import JobRow, MapPieceRow, StepRow
 from db.session import database
 from tests.certifier.scenes import box, planar_arm
@@ -37,7 +37,7 @@ COVERAGE = 0.84
 """Of the arm: rounds with several pieces, in some seconds."""
 
 
-asked = partial(workers_service.asked, kind="map")
+asked = partial(workers_service.asked, kind="map", former="none")
 
 
 @pytest.fixture
@@ -280,6 +280,28 @@ def test_a_former_map_is_taken_over_and_may_be_deleted_meanwhile(client: TestCli
     assert (late.state, (late.error or {})["code"], (late.error or {})["field"]) == ("failed", "map_not_found", "former")
     refused = client.post("/v1/jobs", json={"kind": "map", "scene": row.id, "former": first.id})
     assert (refused.status_code, refused.json()["code"], refused.json()["field"]) == (404, "job_not_found", "former")
+
+
+def test_a_map_begins_with_the_one_of_the_project_that_proves_most_of_the_same_bodies(client: TestClient, planar: Scene) -> None:
+    """The second scene has an obstacle more. A map of another project, which proves more, is not looked at."""
+    here = replace(planar, padding=planar.padding + 3e-6)
+    few, many = (ended(asked(client, here, options={"coverage": share})) for share in (0.3, 0.8))
+    with database().write() as session:
+        projects.add(session, "others")
+    with database().of("others").write() as session:
+        theirs = scenes.add(session, here)
+        hidden, _ = jobs.create(session, kind="map", scene_id=theirs.id, options={**many.options, "coverage": 0.97})
+    send_coordinate(hidden.id)
+    assert ended(hidden.id).outcome == "certified"
+    data = proof_of(client, many.id)
+    more = replace(here, pairs=here.pairs[1:])
+    for scene, former, expected in ((more, many.id, MapProof.from_bytes(data)), (planar_arm(limit=1.7), None, None)):
+        job = ended(asked(client, scene, options={"coverage": 0.9}, former=None))
+        assert job.options["former"] == former
+        assert proof_of(client, job.id) == grow_map(scene, 0.9, former=expected).proof.to_bytes()
+    anew = ended(asked(client, more, options={"coverage": 0.9}))
+    assert (anew.options["former"], proof_of(client, anew.id)) == ("none", grow_map(more, 0.9).proof.to_bytes())
+    assert few.outcome == "certified"
 
 
 def test_another_kind_of_job_has_no_map(client: TestClient, planar: Scene) -> None:
