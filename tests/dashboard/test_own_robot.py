@@ -161,4 +161,4 @@ def test_a_proposal_tells_its_progress_beside_a_settled_iteration(
         pairs.iterations(session, running)[-1].state = IterationState.RUNNING
     page.reload()
     page.get_by_role("heading", name="Iteration 0: a box around the seed since").wait_for()
-    page.get_by_text("Looking for a starting region around the seed").wait_for(state="detached")
+    page.locator("p.empty", has_text="Looking for a starting region around the seed").wait_for(state="detached")  # the log says it, too
