@@ -73,6 +73,10 @@ class SolverTimeRow(Owned, Base):
     month: Mapped[str] = mapped_column(String(7), primary_key=True)
     """In UTC, as 2026-11."""
     seconds: Mapped[float]
+    lately: Mapped[float] = mapped_column(default=0.0)
+    """The same as it was at ``counted_at``, but half of what was before is forgotten every db.solver_time.HALF_LIFE_SECONDS."""
+    counted_at: Mapped[datetime | None]
+    """When something was counted last."""
 
 
 class SceneRow(Owned, Base):

@@ -1,7 +1,8 @@
 """This module counts the seconds in which solvers work for a project, by calendar month in UTC, and holds projects to their limits.
 
 What a pair or a step took is counted when its result is saved, in the same transaction. A project has one row for each month, so that
-nobody adds up the pairs and steps of the past, and deleting them gives nothing back.
+nobody adds up the pairs and steps of the past, and deleting them gives nothing back. The row also says how much of that was lately, by
+which projects take turns.
 """
 
 from __future__ import annotations
@@ -12,16 +13,41 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
+from db import clock
 from db.models import ProjectRow, SolverTimeRow
 from db.session import inserting
 from db.types import utcnow
 
+HALF_LIFE_SECONDS = 15.0
+"""After this time, work counts half when projects take turns: longer than most pieces of work, and soon enough that nobody pays for long
+for having had all solvers while nobody else wanted them."""
+
 
 def add(session: Session, project: str, seconds: float) -> None:
     """Counts seconds of work for a project. It is the last thing that a transaction does: other jobs of the project wait for the row."""
-    new = inserting(session, SolverTimeRow).values(project=project, month=_month(utcnow()), seconds=seconds)
-    total = SolverTimeRow.seconds + new.excluded.seconds
-    session.execute(new.on_conflict_do_update(index_elements=["project", "month"], set_={"seconds": total}))
+    now = clock.now(session)
+    key = {"project": project, "month": _month(utcnow())}
+    session.execute(inserting(session, SolverTimeRow).values(**key, seconds=0.0, lately=0.0).on_conflict_do_nothing())
+    row = session.get_one(SolverTimeRow, key, with_for_update=True)
+    row.seconds += seconds
+    row.lately, row.counted_at = _remembered(row, now) + seconds, now
+
+
+def lately(session: Session) -> dict[str, float]:
+    """Returns the seconds in which solvers have worked lately for each project, by name; what is longer ago counts less.
+
+    Who gives time to the project with the least gives each the same in the long run, and owes nothing to a project that had no work.
+    """
+    now = clock.now(session)
+    rows = session.scalars(select(SolverTimeRow).where(SolverTimeRow.month == _month(utcnow())))
+    return {row.project: _remembered(row, now) for row in rows}
+
+
+def _remembered(row: SolverTimeRow, now: datetime) -> float:
+    """Returns what is left of the seconds that a row has lately."""
+    if row.counted_at is None:
+        return 0.0
+    return row.lately * 0.5 ** (max((now - row.counted_at).total_seconds(), 0.0) / HALF_LIFE_SECONDS)
 
 
 def used(session: Session, project: str) -> float:

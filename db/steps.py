@@ -42,15 +42,18 @@ def add(session: Session, job: JobRow, kind: str, input: dict[str, Any]) -> Step
     return step
 
 
-def claim(session: Session, job: JobRow, *, accepts: bool, lease_seconds: float, pieces: bool = False) -> Claim | None:
+def claim(session: Session, job: JobRow, *, accepts: bool, lease_seconds: float, pieces: bool = False, fresh: bool = False) -> Claim | None:
     """Claims the job's latest open step: one that accepts a region, or one that the job waits for. Returns None without one.
 
     The caller holds the job's lock.
 
     Args:
         pieces: whether to claim a piece of a map's round only.
+        fresh: whether to claim a step only that nobody has begun before.
     """
     query = select(StepRow).where(is_open(StepRow, job.id, accepts=accepts))
+    if fresh:
+        query = query.where(StepRow.attempts == 0)
     if pieces:
         query = query.where(StepRow.kind == PIECE)
     step = session.scalar(query.order_by(StepRow.turn.desc(), StepRow.id).limit(1))

@@ -3,7 +3,8 @@
 A message to the solvers only says that there is work. Which work it is, this module decides when a solver is free. It goes to the
 project whose work the fewest solvers do now, however many keys and jobs the project has; within it to the key of which the same is
 true; within the key to the job that was served least. So a newcomer gets the next solver that is free, however long pieces of others
-take. Projects and keys of which as many solvers work take turns. While no solver is free, a process beside them does pieces of new jobs.
+take. Of projects for which as many solvers work, that one goes first for which they worked least lately (db.solver_time). Keys of which as
+many work take turns. While no solver is free, a process beside them does pieces of new jobs.
 
 ``jobs.served`` counts the seconds that a job was given, divided by its share. The job with the least goes next (stride scheduling:
 Waldspurger, Weihl 1995). Each step of priority doubles a job's share of its key's work.
@@ -22,7 +23,7 @@ from functools import cache
 from sqlalchemy import ColumnElement, Row, Select, and_, bindparam, case, exists, func, or_, select
 from sqlalchemy.orm import Session, aliased
 
-from db import jobs, leases, pairs, steps, workers
+from db import jobs, leases, pairs, solver_time, steps, workers
 from db.models import JobRow, PairRow, StepRow
 from db.states import ACCEPT, LEAD, PIECE, JobState, PairState, StepState
 from db.types import Utc, utcnow
@@ -57,18 +58,18 @@ def _in_turn(session: Session, places: int, most: int) -> Sequence[str]:
     found = session.execute(_placed(), {"now": utcnow(), "places": places, "most": most}).all()
     if len(found) < 2:
         return [one.id for one in found]
-    return [one.id for one in _sorted(found, *_held(session))]
+    return [one.id for one in _sorted(session, found, *_held(session))]
 
 
-def _sorted(found: Sequence[Placed], of_project: Counter[str], of_key: Counter[tuple[str, str | None]]) -> Sequence[Placed]:
+def _sorted(
+    session: Session, found: Sequence[Placed], of_project: Counter[str], of_key: Counter[tuple[str, str | None]]
+) -> Sequence[Placed]:
     """Returns jobs in the order of work, from the solvers that each project and each key has."""
-    served: dict[str, float] = {}
-    for one in found:
-        served[one.project] = min(one.served, served.get(one.project, math.inf))
+    lately = solver_time.lately(session)
 
     def turn(one: Placed) -> tuple[int, int, float, str, int, float, str]:
         project, key = one.project, (one.project, one.key_id)
-        return one.place, of_project[project], served[project], project, of_key[key], one.served, one.key_id or ""
+        return one.place, of_project[project], lately.get(project, 0.0), project, of_key[key], one.served, one.key_id or ""
 
     return sorted(found, key=turn)
 
@@ -90,7 +91,7 @@ def newcomer(session: Session, *, instead_of: str | None = None) -> str | None:
     of_project, of_key = held = _held(session)
     waiting = session.execute(_placed(), {"now": now, "places": 1, "most": MOST_KEYS}).all()
     least = min(of_project[project] for project in {*of_project, *(one.project for one in waiting)})
-    may = [one for one in _sorted(found, *held) if of_project[one.project] <= least]
+    may = [one for one in _sorted(session, found, *held) if of_project[one.project] <= least]
     mine = session.execute(select(JobRow.project, JobRow.key_id, JobRow.created_at).where(JobRow.id == instead_of)).one_or_none()
     if mine is not None:
         newer = set(session.scalars(select(JobRow.id).where(JobRow.id.in_([one.id for one in may]), JobRow.created_at > mine.created_at)))
@@ -128,16 +129,21 @@ def is_there(session: Session) -> bool:
     return session.scalar(_any(), {"now": utcnow()}) is not None
 
 
-def claim(session: Session, job_id: str, *, lease_seconds: float, batch_seconds: float) -> pairs.Claim | steps.Claim | None:
+def claim(
+    session: Session, job_id: str, *, lease_seconds: float, batch_seconds: float, fresh: bool = False
+) -> pairs.Claim | steps.Claim | None:
     """Claims one piece of the job's work: a step that the job waits for, else the latest region to accept, else pairs.
 
     So a region is there for planners soon after it was certified. A job accepts one region at a time, and rests in between
     (``jobs.accept_after``). The function returns None when other workers were faster.
+
+    Args:
+        fresh: whether steps that the job waits for and that were begun before are left to others.
     """
     job = jobs.lock(session, job_id)
     claimed: pairs.Claim | steps.Claim | None = None
     if job.state == JobState.RUNNING:
-        claimed = steps.claim(session, job, accepts=False, lease_seconds=lease_seconds)
+        claimed = steps.claim(session, job, accepts=False, lease_seconds=lease_seconds, fresh=fresh)
     if claimed is None and session.scalar(_has_region_now(), {"job": job_id, "now": utcnow()}):
         claimed = steps.claim(session, job, accepts=True, lease_seconds=lease_seconds)
     if claimed is None and job.state == JobState.RUNNING:

@@ -50,7 +50,7 @@ def _claim() -> pairs.Claim | steps.Claim | None:
             return None
     limits = settings()
     with database().write() as session:
-        return work.claim(session, job_id, lease_seconds=limits.lease_seconds, batch_seconds=limits.batch_seconds)
+        return work.claim(session, job_id, lease_seconds=limits.lease_seconds, batch_seconds=limits.batch_seconds, fresh=True)
 
 
 class _Trial:

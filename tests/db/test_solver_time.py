@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 
 import pytest
 from sqlalchemy import select
@@ -37,6 +37,22 @@ def test_the_seconds_of_pairs_count_once_they_are_saved(db: Database) -> None:
         with db.write() as session:
             pairs.save(session, claim, took)
         assert used(db) == 6.0, "results of pairs that are not held any more are dropped"
+
+
+def test_of_what_solvers_have_done_lately_half_is_forgotten_every_quarter_of_a_minute(db: Database) -> None:
+    with db.write() as session:
+        projects.add(session, "others")
+        solver_time.add(session, DEFAULT_PROJECT, 8.0)
+        row = session.scalars(select(SolverTimeRow)).one()
+        assert row.counted_at is not None
+        row.counted_at -= timedelta(seconds=3 * solver_time.HALF_LIFE_SECONDS)
+    with db.read() as session:
+        assert solver_time.lately(session) == pytest.approx({DEFAULT_PROJECT: 1.0}, rel=0.1)
+    with db.write() as session:
+        solver_time.add(session, DEFAULT_PROJECT, 2.0)
+        solver_time.add(session, "others", 5.0)
+        assert solver_time.lately(session) == pytest.approx({DEFAULT_PROJECT: 3.0, "others": 5.0}, rel=0.1)
+    assert used(db) == 10.0, "of what counts for the limit nothing is forgotten"
 
 
 def test_deleting_jobs_gives_no_time_back(db: Database) -> None:

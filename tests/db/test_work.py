@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from certifier.errors import CirisError
-from db import jobs, leases, pairs, projects, steps, work, workers
+from db import jobs, leases, pairs, projects, solver_time, steps, work, workers
 from db.models import DEFAULT_PROJECT, ApiKeyRow, JobRow, ProjectRow, StepRow
 from db.pairs import batch
 from db.session import Database
@@ -158,6 +158,29 @@ def test_long_work_of_others_takes_no_share(db: Database) -> None:
     before = solvers.seconds[late]
     solvers.run_until(240.0)
     assert solvers.seconds[late] - before == pytest.approx(2 * 180, rel=0.1), "two of the four"
+
+
+def test_of_projects_with_as_many_solvers_the_one_goes_first_that_had_less_time_lately(db: Database) -> None:
+    """It counts what the project had, not what its least served job did: with many keys there is always one that was hardly served."""
+    many = {a_job_of(db, f"key{i}", project="a") for i in range(9)}
+    one = a_job_of(db, "one", project="b")
+    for project, seconds, first in (("a", 1.0, {one}), ("b", 2.0, many), ("a", 2.0, {one})):
+        with db.write() as session:
+            solver_time.add(session, project, seconds)
+        with db.read() as session:
+            assert work.next_job(session) in first
+        assert newcomer(db) in first
+
+
+def test_who_always_has_a_new_small_job_has_no_larger_share(db: Database) -> None:
+    """Three solvers for two projects: the third one takes turns."""
+    long = a_job_of(db, "long", project="a", pair_count=200)
+    solvers, small = Solvers(db, 3, 0.0), list[str]()
+    for end in range(1, 61):
+        small += [a_job_of(db, "small", project="b", pair_count=1) for _ in range(2)]
+        solvers.run_until(float(end))
+    assert sum(solvers.seconds[job_id] for job_id in small) == pytest.approx(90, rel=0.1)
+    assert solvers.seconds[long] == pytest.approx(90, rel=0.1)
 
 
 def told(db: Database, processes: int) -> None:

@@ -17,7 +17,7 @@ from sqlalchemy.exc import OperationalError
 from certifier.growth.options import GrowthOptions
 from certifier.jobs.local import grow
 from certifier.model import Scene
-from db import jobs, leases, workers
+from db import jobs, leases, pairs, steps, workers
 from db.models import JobRow, StepRow, WorkerRow
 from db.session import database
 from db.states import WorkerState
@@ -134,6 +134,24 @@ def test_without_a_slot_only_what_new_jobs_wait_for_is_done(job_id: str, own_que
     with database().write() as session:
         session.execute(update(JobRow).where(JobRow.id == other).values(claimed_at=job_of(other).created_at.replace(year=2000)))
     assert work_for_newcomer(Slots(0)) is None, "the job is not new any more"
+
+
+@pytest.mark.usefixtures("no_wait")
+def test_a_step_that_it_gave_up_is_not_begun_again_for_a_region_that_waits(job_id: str, own_queue: Queue) -> None:
+    """Or else it is begun and given up all the time, which helps nobody and takes a process from others."""
+    own_queue.flush()
+    with database().write() as session:
+        job = jobs.lock(session, job_id)
+        pairs.skip(session, job)
+        seeding = steps.add(session, job, "propose", {})
+        seeding.attempts = 1
+        accepting = steps.add(session, job, "accept", {"iteration": 0})
+        seeding_id, accepting_id = seeding.id, accepting.id
+    assert work_for_newcomer(Slots(0)) is not None
+    with database().read() as session:
+        assert session.get_one(StepRow, seeding_id).attempts == 1
+        assert session.get_one(StepRow, accepting_id).attempts == 1
+    assert work_for_newcomer(Slots(0)) is None
 
 
 def test_a_short_outage_of_the_database_fails_no_step(monkeypatch: pytest.MonkeyPatch) -> None:
