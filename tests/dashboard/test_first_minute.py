@@ -12,6 +12,7 @@ import pytest
 import yaml
 from fastapi.testclient import TestClient
 
+from certifier.model import Scene
 from certifier.scene.bundle import pack_bundle
 from tests.dashboard.samples import NAMES, ROOT, SAMPLES, files
 
@@ -98,13 +99,13 @@ def test_the_robot_begins_at_the_seed_beside_the_scene_file(
     assert page.get_by_text("The seed file does not name a configuration within the limits").count() == ("90" in seed)
 
 
-def drop(page: Any, place: Any, path: Path) -> None:
+def drop(page: Any, place: Any, path: Path, steps: tuple[str, ...] = ("dragEnter", "dragOver", "drop")) -> None:
     """Drops a file or a folder on the page, as the file manager of a desktop does."""
     box = place.bounding_box()
     at = {"x": box["x"] + 5, "y": box["y"] + 5}
     dragged = {"items": [], "files": [str(path)], "dragOperationsMask": 1}
     tools = page.context.new_cdp_session(page)
-    for step in ("dragEnter", "dragOver", "drop"):
+    for step in steps:
         tools.send("Input.dispatchDragEvent", {"type": step, **at, "data": dragged})
 
 
@@ -126,6 +127,22 @@ def test_a_urdf_that_is_dropped_is_taken_as_it_is(page: Any, url: str) -> None:
     page.get_by_label("or upload one").wait_for()
     drop(page, page.locator(".choose"), ARM)
     page.get_by_text("arm is stored, with 3 joints").wait_for()
+
+
+def test_the_page_marks_what_takes_a_file_that_is_dragged(page: Any, url: str, planar: Scene) -> None:
+    page.goto(f"{url}/new")
+    page.get_by_text("Certify a motion").click()
+    marked, motion, carried = page.locator(".choose.over"), page.get_by_label("Motion", exact=True), ("dragEnter", "dragOver")
+    drop(page, page.locator(".choose"), ARM, carried)
+    marked.wait_for()
+    motion.scroll_into_view_if_needed()
+    drop(page, motion, ARM, carried)
+    marked.wait_for(state="detached")
+    page.locator("main h1").scroll_into_view_if_needed()
+    drop(page, page.locator(".choose"), ARM, carried)
+    marked.wait_for()
+    drop(page, page.locator(".choose"), ARM)
+    marked.wait_for(state="detached")
 
 
 def zipped(directory: Path) -> bytes:

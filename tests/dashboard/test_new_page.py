@@ -540,6 +540,23 @@ def test_nothing_keeps_people_out(browser: Any, url: str, planar: Scene, barrier
     context.close()
 
 
+@pytest.mark.parametrize(
+    ("q", "button", "asks"), [("0,0", "Random free one", "contacts"), ("0.384,0.262", "Free one near by", "plan")], ids=["random", "near"]
+)
+def test_the_form_says_that_it_looks_for_a_free_configuration(page: Any, url: str, planar: Scene, q: str, button: str, asks: str) -> None:
+    """The first search on a machine may take minutes, because programs are compiled for it."""
+    page.goto(f"{url}/new?scene=planar&q={q}")
+    page.get_by_text("Not free" if "near" in button else "No collision (computed").wait_for()
+    held: list[Any] = []
+    page.route(f"**/v1/planning/{asks}", lambda route: route.continue_() if held else held.append(route))
+    page.get_by_role("button", name=button).click()
+    page.get_by_role("status").filter(has_text="Looking for a free configuration").wait_for()
+    assert page.get_by_role("button", name=button).is_disabled()
+    held[0].continue_()
+    page.get_by_text("Looking for a free configuration").wait_for(state="detached")
+    page.get_by_text("No collision (computed").wait_for()
+
+
 def test_the_form_says_that_a_box_is_for_the_papers_algorithm(opened: Any, url: str, client: TestClient, complaints: list[str]) -> None:
     opened.locator("summary", has_text="More options").click()
     method, start = opened.get_by_label("Method"), opened.get_by_role("button", name="Start the job")

@@ -101,7 +101,53 @@ def test_a_robot_without_its_meshes_says_which_file_is_missing(page: Any, url: s
     (tmp_path / "arm.urdf").write_text(urdf("arm"))
     upload(page, url, tmp_path / "arm.urdf")
     page.get_by_text("arm.urdf takes a file from the package arm_description, and the zip has no meshes/link.obj").wait_for()
+    page.get_by_text("A single file brings no meshes along. Choose its folder instead.").wait_for()
     complaints.clear()
+
+
+def test_a_folder_with_several_robots_is_called_by_its_name(page: Any, url: str, tmp_path: Path, complaints: list[str]) -> None:
+    folder = tmp_path / "two"
+    folder.mkdir()
+    (folder / "link.obj").write_text(TETRAHEDRON)
+    for name in ("left", "right"):
+        (folder / f"{name}.urdf").write_text(urdf(name, "link.obj"))
+    page.goto(f"{url}/new")
+    page.get_by_label("or its folder").set_input_files(folder)
+    page.get_by_label("two has several robots or scenes. Which one?").select_option("two/left.urdf")
+    page.get_by_text("left is stored, with 2 joints and 1 pair").wait_for()
+    complaints.clear()
+
+
+def test_what_to_know_of_a_robot_is_read_where_it_is_uploaded(
+    page: Any, url: str, client: TestClient, tmp_path: Path, barriers: Any
+) -> None:
+    endless = urdf("arm", "link.obj").replace('type="revolute"', 'type="continuous"')
+    upload(page, url, packed(tmp_path, arm___urdf=endless, link___obj=TETRAHEDRON))
+    page.get_by_text("Read this before you trust a proof about it:").wait_for()
+    assert page.locator(".choose li").all_text_contents() == client.get("/v1/scenes/arm/lint").json()["warnings"]
+    assert barriers(page) == []
+
+
+def test_a_robot_that_cannot_collide_is_said_to_leave_nothing_to_prove(
+    page: Any, url: str, client: TestClient, tmp_path: Path, barriers: Any
+) -> None:
+    """Its second link has geometry for looks alone. All proofs about it would be about nothing."""
+    looks = (
+        urdf("arm")
+        .replace('<link name="tip"><collision>', '<link name="tip"><visual>')
+        .replace("</collision></link>\n<joint", "</visual></link>\n<joint")
+    )
+    (tmp_path / "arm.urdf").write_text(
+        looks.replace('<mesh filename="package://arm_description/meshes/link.obj"/>', '<sphere radius="0.1"/>')
+    )
+    upload(page, url, tmp_path / "arm.urdf")
+    page.get_by_text("arm is stored, with 2 joints and 0 pairs").wait_for()
+    page.get_by_text("Nothing in this scene can collide, so there is nothing to prove").wait_for()
+    assert barriers(page) == []
+    job = client.post("/v1/jobs", json={"kind": "grow", "scene": "arm", "seed": {"q": [0.0, 0.0]}}).json()["id"]
+    page.goto(f"{url}/jobs/{job}")
+    page.get_by_text("Nothing in this scene can collide: it has no two bodies that move against each other.").wait_for()
+    assert page.get_by_text("is covered").count() == 0
 
 
 @pytest.mark.usefixtures("confining")

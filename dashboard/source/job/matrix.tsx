@@ -85,7 +85,7 @@ export function Matrix({ store, version, memory }: { store: JobStore; version: n
       {rows.length > 0 ? (
         <Grid store={store} version={version} rows={rows} memory={memory} />
       ) : (
-        <p class="empty">No pair is like this in the last iteration.</p>
+        <p class="empty">{store.pairs.length === 0 ? "The scene has no pairs." : "No pair is like this in the last iteration."}</p>
       )}
     </section>
   );

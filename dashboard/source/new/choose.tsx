@@ -1,8 +1,8 @@
 // The scene to work on: one that is stored, or one that is uploaded now.
 import { useEffect, useState } from "preact/hooks";
-import { said, ServiceError, upload } from "../common/api";
+import { get, said, ServiceError, upload } from "../common/api";
 import { chosen as chosenFiles, dropped, nameOf, packed, pathsIn, saying, type Chosen } from "../common/zip";
-import type { SceneDetail, SceneModel } from "../common/schema";
+import type { LintReport, SceneDetail, SceneModel } from "../common/schema";
 import { seedIn } from "./seed";
 
 export type Scene = Pick<SceneDetail, "id" | "name" | "names" | "joints" | "pairs" | "warnings">;
@@ -25,19 +25,27 @@ export function named({ id, name, names }: Scene): string {
 
 /** A zip with several files of which each may be the scene or the robot, by what they may be. */
 interface Several {
+  /** What somebody would call it. */
+  name: string;
   file: File;
   groups: [string, string[]][];
 }
 
+const MODEL = /\.(urdf|sdf|mjcf|xacro)$/i;
 const GROUPS: [string, RegExp][] = [
   ["Models of robots", /\.(urdf|sdf|mjcf|urdf\.xacro|sdf\.xacro)$/i],
   ["Scene files", /\.yaml$/i],
   ["Models of MuJoCo", /\.xml$/i],
 ];
 
-async function several(file: File): Promise<Several> {
+async function several(name: string, file: File): Promise<Several> {
   const paths = (await pathsIn(file)).filter((path) => !/^__MACOSX|(^|\/)package\.xml$/.test(path));
-  return { file, groups: GROUPS.map(([title, kind]): [string, string[]] => [title, paths.filter((path) => kind.test(path)).sort()]).filter(([, found]) => found.length > 0) };
+  return { name, file, groups: GROUPS.map(([title, kind]): [string, string[]] => [title, paths.filter((path) => kind.test(path)).sort()]).filter(([, found]) => found.length > 0) };
+}
+
+/** What to do where a model was given without the files that it names. */
+function alone(name: string, reason: unknown): string {
+  return reason instanceof ServiceError && reason.code === "scene_package" && MODEL.test(name) ? " A single file brings no meshes along. Choose its folder instead." : "";
 }
 
 /** Where in a scene file something is wrong. */
@@ -51,6 +59,9 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
   const [added, setAdded] = useState<SceneDetail | null>(null);
   const [seeded, setSeeded] = useState(false);
   const [choice, setChoice] = useState<Several | null>(null);
+  const [warnings, setWarnings] = useState<string[]>([]);
+  /** Whether something is being dragged over the page. */
+  const [over, setOver] = useState(false);
   const offers = scenes.flatMap((scene) => scene.names.map((name) => ({ ...scene, name, title: name })));
   // An address may give a scene otherwise, such as by its id.
   if (model && chosen !== null && !offers.some(({ name }) => name === chosen)) offers.unshift({ id: model.scene, name: chosen, title: model.name, names: [], joints: model.q_star.length, pairs: model.pairs.length, warnings: 0 });
@@ -63,14 +74,15 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
       whole = await file();
       const scene = await upload<SceneDetail>("/v1/scenes", "bundle", whole);
       const seed = await seedIn(whole);
+      setWarnings(scene.warnings > 0 ? (await get<LintReport>(`/v1/scenes/${scene.id}/lint`)).warnings : []);
       setAdded(scene);
       setSeeded(seed !== null);
       setChoice(null);
       onUpload(scene, seed);
     } catch (reason) {
-      const found = whole && reason instanceof ServiceError && reason.code === "bundle_choice" ? await several(whole) : null;
+      const found = whole && reason instanceof ServiceError && reason.code === "bundle_choice" ? await several(name, whole) : null;
       if (found?.groups.length) setChoice(found);
-      else setProblem(`${name} is no scene that can be used: ${where(reason)}${said(reason)}`);
+      else setProblem(`${name} is no scene that can be used: ${where(reason)}${said(reason)}${alone(name, reason)}`);
     }
     setSending(null);
   };
@@ -80,21 +92,30 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
   };
   // A scene may be dropped anywhere, but where the form asks for another file.
   useEffect(() => {
-    const over = (event: DragEvent): void => event.preventDefault();
+    const dragged = (event: DragEvent): void => {
+      // Another field may take it.
+      setOver(!event.defaultPrevented && (event.dataTransfer?.types.includes("Files") ?? false));
+      event.preventDefault();
+    };
+    // It leaves the page where there is nothing that it enters.
+    const left = (event: DragEvent): void => void (event.relatedTarget === null && setOver(false));
     const drop = (event: DragEvent): void => {
+      setOver(false);
       if (event.defaultPrevented || !event.dataTransfer) return;
       event.preventDefault();
       void dropped(event.dataTransfer).then(take, (reason: unknown) => setProblem(`What was dropped cannot be read: ${String(reason)}`));
     };
-    document.addEventListener("dragover", over);
+    document.addEventListener("dragover", dragged);
+    document.addEventListener("dragleave", left);
     document.addEventListener("drop", drop);
     return () => {
-      document.removeEventListener("dragover", over);
+      document.removeEventListener("dragover", dragged);
+      document.removeEventListener("dragleave", left);
       document.removeEventListener("drop", drop);
     };
   }, [onUpload]);
   return (
-    <div class="choose card">
+    <div class={`choose card${over ? " over" : ""}`}>
       <p>
         <label for="new-scene">Scene</label>
         <select id="new-scene" value={chosen ?? ""} onChange={(event) => onChoose(event.currentTarget.value)} disabled={offers.length === 0}>
@@ -115,14 +136,14 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
         </span>
       </p>
       <p class="quiet small" id="new-upload-says">
-        A folder, or a zip of it, with <code>scene.yaml</code> and every model and mesh that it refers to. Or a robot alone: its URDF, SDFormat, MJCF or xacro file, or a folder that has one and its meshes; the service then drafts the scene, as <code>ciris scene init</code> does. Or drop it anywhere on this page.
+        Give the file of your robot (URDF, SDFormat, MJCF or xacro). If it has meshes, give the folder with all of it, or a zip of the folder. The service makes a scene of the robot. If you have a <code>scene.yaml</code>, give its folder. You can also drop any of these anywhere on this page.
       </p>
       <div role="status">
         {sending && <p class="notice">Reading {sending} …</p>}
         {problem && <p class="notice bad">{problem}</p>}
         {choice && (
           <p class="notice">
-            <label for="new-which">{choice.file.name} has several robots or scenes. Which one?</label>{" "}
+            <label for="new-which">{choice.name} has several robots or scenes. Which one?</label>{" "}
             <select id="new-which" value="" onChange={({ currentTarget: { value } }) => void send(value, () => saying(choice.file, value))}>
               <option value="">choose …</option>
               {choice.groups.map(([title, paths]) => <optgroup label={title} key={title}>{paths.map((path) => <option key={path}>{path}</option>)}</optgroup>)}
@@ -132,9 +153,10 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
         {added && (
           <p class="notice">
             {added.name} is stored, with {added.joints} {added.joints === 1 ? "joint" : "joints"} and {added.pairs} {added.pairs === 1 ? "pair" : "pairs"}.{seeded && " The robot stands at the seed that came with it."}
-            {added.warnings > 0 && <> Read its <a href={`/scenes/${added.id}`}>{added.warnings} {added.warnings === 1 ? "warning" : "warnings"}</a> first.</>}
+            {warnings.length > 0 && " Read this before you trust a proof about it:"}
           </p>
         )}
+        {added && warnings.length > 0 && <ul class="small">{warnings.map((warning) => <li key={warning}>{warning}</li>)}</ul>}
       </div>
     </div>
   );

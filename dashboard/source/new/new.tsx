@@ -88,6 +88,7 @@ function Start({ given, model, parts, first }: Props & { given: string; model: S
   const [problem, setProblem] = useState<string | null>(null);
   const [refused, setRefused] = useState<Refused | null>(null);
   const [sending, setSending] = useState(false);
+  const [looking, setLooking] = useState(false);
   const [configurations, setConfigurations] = useState<SceneDetail["configurations"]>({});
   const moment = useMoment(model.scene, q);
   const touching = useMemo(() => touchingOf(model, moment), [model, moment]);
@@ -109,25 +110,28 @@ function Start({ given, model, parts, first }: Props & { given: string; model: S
     setWish(next);
     setProblem(null);
   };
+  /** Looks for another configuration, and says so meanwhile. */
+  const look = async (search: () => Promise<void>): Promise<void> => {
+    setLooking(true);
+    setProblem(null);
+    try {
+      await search();
+    } catch (reason) {
+      setProblem(said(reason));
+    }
+    setLooking(false);
+  };
   const search = async (): Promise<void> => {
     const drawn = Array.from({ length: TRIES }, () => model.q_lower.map((low, i) => low + (model.q_upper[i]! - low) * Math.random()));
-    try {
-      const { contacts } = await post<ContactsResponse>("/v1/planning/contacts", { scene: model.scene, q: drawn });
-      const free = contacts.findIndex(({ pairs, outside }) => pairs?.length === 0 && outside.length === 0);
-      setProblem(free < 0 ? `None of ${TRIES} random configurations is free.` : null);
-      if (free >= 0) setQ(drawn[free]!);
-    } catch (reason) {
-      setProblem(said(reason));
-    }
+    const { contacts } = await post<ContactsResponse>("/v1/planning/contacts", { scene: model.scene, q: drawn });
+    const free = contacts.findIndex(({ pairs, outside }) => pairs?.length === 0 && outside.length === 0);
+    if (free < 0) setProblem(`None of ${TRIES} random configurations is free.`);
+    else setQ(drawn[free]!);
   };
   const moveNear = async (): Promise<void> => {
-    try {
-      const { collision } = await post<PlanResponse>("/v1/planning/plan", { scene: model.scene, start: q, goal: q });
-      setProblem(collision && !collision.free ? "No free configuration was found near by." : null);
-      if (collision?.free) setQ(collision.free);
-    } catch (reason) {
-      setProblem(said(reason));
-    }
+    const { collision } = await post<PlanResponse>("/v1/planning/plan", { scene: model.scene, start: q, goal: q });
+    if (collision?.free) setQ(collision.free);
+    else if (collision) setProblem("No free configuration was found near by.");
   };
   const submit = async (event: Event): Promise<void> => {
     event.preventDefault();
@@ -169,8 +173,9 @@ function Start({ given, model, parts, first }: Props & { given: string; model: S
           <Sliders names={names} units={model.units} lower={model.q_lower} upper={model.q_upper} q={q} onChange={setQ} />
           <p class="toolbar">
             <button type="button" title="The scene's own configuration q*, about which it is described" onClick={() => setQ(within(model, model.q_star))}>Centre q*</button>
-            <button type="button" onClick={() => void search()}>Random free one</button>
-            {moment.trouble.length > 0 && <button type="button" onClick={() => void moveNear()}>Free one near by</button>}
+            <button type="button" disabled={looking} onClick={() => void look(search)}>Random free one</button>
+            {moment.trouble.length > 0 && <button type="button" disabled={looking} onClick={() => void look(moveNear)}>Free one near by</button>}
+            <span role="status">{looking && "Looking for a free configuration …"}</span>
             {Object.keys(configurations).length > 0 && (
               <label>
                 Named configuration{" "}
@@ -187,6 +192,7 @@ function Start({ given, model, parts, first }: Props & { given: string; model: S
       </div>
       <form onSubmit={(event) => void submit(event)}>
         <Wishes wish={wish} parts={parts[wish.kind]} refused={refused} onWish={change} marks={wish.marks.map((mark) => asText(mark, model.units))} here={isMarked(wish, q)} onMark={() => change({ ...wish, marks: [...wish.marks, q] })} onGo={(mark) => setQ(wish.marks[mark]!)} />
+        {model.pairs.length === 0 && <p class="notice bad">Nothing in this scene can collide, so there is nothing to prove: no two of its bodies move against each other. Has the model collision geometry (<code>&lt;collision&gt;</code>)? What is only for looks (<code>&lt;visual&gt;</code>) does not count.</p>}
         <div role="alert">
           {between && <p class="notice bad">{between} <button type="button" class="plain" onClick={() => change({ ...wish, kind: "cover", goal: "connect", marks: held })}>Connect them with several regions</button></p>}
           {problem && <p class="notice bad">{problem}</p>}
