@@ -50,6 +50,24 @@ def kind_in_words(kind: str) -> str:
     return _KINDS.get(kind, kind)
 
 
+_WORK = {
+    "decide": "deciding what comes next",
+    "seed": "looking for a starting region",
+    "step": "moving the faces of a region",
+    "accept": "putting a proof together and verifying it",
+    "scout": "looking at what is covered",
+    "move": "looking for motions between regions",
+    "motion": "certifying a motion",
+    "map": "choosing which cells of a map to prove",
+    "piece": "proving cells of a map",
+}
+
+
+def work_in_words(work: str) -> str:
+    """Returns what a process does that certifies no pairs, by the API's word for it."""
+    return _WORK.get(work, work)
+
+
 _MEANINGS = {
     "certified": "The bodies are apart, and the verifier has accepted the proof.",
     "refuted": "Bodies touch, at a configuration that is shown.",
@@ -88,6 +106,7 @@ templates.env.filters |= {
     "radians": math.radians,
     "rounded_down": rounded_down,
     "stage": stage,
+    "work_in_words": work_in_words,
 }
 
 

@@ -31,8 +31,8 @@ class HeldWork(BaseModel):
     work: str = Field(
         description="What the process does: `pairs` certifies pairs, `decide` decides what the job does next. Else it is a step of the "
         "job: `seed` looks for the polytope that growing begins with; `step` moves the faces of the last region, all pairs coupled; "
-        "`accept` puts the proof of a region together and verifies it; `scout` looks how much a cover has covered; `motion` certifies a "
-        "motion."
+        "`accept` puts the proof of a region together and verifies it; `scout` looks how much a cover has covered; `move` looks for "
+        "motions between regions; `motion` certifies a motion; `map` chooses which cells of a map to prove, `piece` proves some of them."
     )
     iteration: int | None = Field(description="Iteration of the pairs; null where the work is no pairs.")
     pairs: list[int] = Field(description="Indices of the pairs that it certifies, ascending; those that are done already are left out.")

@@ -10,6 +10,9 @@ from typing import Any
 from fastapi.testclient import TestClient
 
 from api.access import KEYS_SECONDS
+from api.held import SAID
+from api.pages.rendering import ROOT as DASHBOARD
+from api.pages.rendering import work_in_words
 from db import keys, leases, projects, workers
 from db.keys import Scope
 from db.session import Database
@@ -25,6 +28,7 @@ def test_the_page_shows_what_workers_do_and_pauses_them(page: Any, url: str, bus
     page.get_by_role("link", name="Workers").click()
     row = page.get_by_role("row").nth(1)
     assert "1 of 4" in row.text_content()
+    assert "certifying 1 pair, job" in row.text_content()
     assert "expiry failed: OverflowError" in row.text_content()
     assert row.get_by_role("link", name=busy[:8]).get_attribute("href") == f"/jobs/{busy}"
     (since,) = row.get_by_role("cell").nth(4).locator("time").all()
@@ -45,6 +49,14 @@ def test_the_page_shows_what_workers_do_and_pauses_them(page: Any, url: str, bus
     page.get_by_role("button", name="Drain").click()
     page.get_by_text("to be draining").wait_for()
     assert page.get_by_role("button", name="Pause").count() == 0
+
+
+def test_pages_have_words_for_the_same_work() -> None:
+    """The page of a job is written in the browser, that of the workers in the service."""
+    source = (DASHBOARD / "source/job/steps.ts").read_text()
+    known = re.findall(r"^  (\w+): ", source.partition("const STEPS")[2], re.MULTILINE)
+    assert {"map", "piece", "seed"} <= set(known)
+    assert [kind for kind in known if work_in_words(SAID.get(kind, kind)) == kind] == []
 
 
 def test_only_those_who_run_the_service_have_buttons(client: TestClient, busy: str, database: Database) -> None:
@@ -81,13 +93,13 @@ def test_the_page_says_which_worker_is_missing(client: TestClient, database: Dat
         return re.findall("<strong>(.*?)</strong>", client.get("/workers/live").text)
 
     solver, control = (Made(f"host:{kind}:1", kind, "1.2", 4, 8, 2**34) for kind in (WorkerKind.SOLVE, WorkerKind.CONTROL))
-    assert notices() == ["Jobs are queued: no worker."]
+    assert notices() == ["Jobs stay queued: no worker."]
     with database.write() as session:
         workers.tell(session, control, WorkerState.RUNNING)
-    assert notices() == ["Jobs are queued: no worker."], "a control worker solves nothing"
+    assert notices() == ["Jobs stay queued: no worker."], "a control worker solves nothing"
     with database.write() as session:
         workers.tell(session, solver, WorkerState.PAUSED)
-    assert notices() == ["Jobs are queued: all workers paused."]
+    assert notices() == ["Jobs stay queued: all workers paused."]
     with database.write() as session:
         workers.tell(session, solver, WorkerState.RUNNING)
     assert notices() == []

@@ -21,6 +21,6 @@ const STEPS: Record<string, (subject: string) => string> = {
   scout: () => "Looking at what is covered",
   move: () => "Looking for motions between regions",
   motion: () => "Certifying the motion",
-  map: () => "Leading the work on the map",
+  map: () => "Choosing which cells of the map to prove",
   piece: () => "Proving cells of the map",
 };
