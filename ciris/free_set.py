@@ -317,7 +317,8 @@ def _checked(cls: type[FreeSet], head: dict[str, Any], arrays: dict[str, NDArray
         raise ValueError("the arrays do not fit each other")
     nodes, number = lookups.nodes_of(joint, cut, upper)
     of_space = space.q_star, space.revolute, space.q_lower, space.q_upper
-    cells = lookups.Cells(frozen(nodes, nodes.dtype), frozen(number[root], np.int32), first, tree, arrays["normals"], *of_space, tolerance)
+    faces = arrays["normals"], frozen(lookups.spans_of(arrays["normals"]), np.int32)
+    cells = lookups.Cells(frozen(nodes, nodes.dtype), frozen(number[root], np.int32), first, tree, *faces, *of_space, tolerance)
     return cls(str(head["scene"]), str(head["name"]), space, clauses, cells)
 
 

@@ -47,6 +47,7 @@ class Cells(NamedTuple):
         first: (K + 1,) int32, where the trees of each clause begin in ``tree``.
         tree: int32, the trees of all clauses. A clause holds where one of its trees has a proved cell.
         normals: (O, n) of the oblique cuts.
+        spans: (O, 2) int32, the first joint for which a normal is not 0, and the one behind the last.
         q_star: (n,) the positions at which s is 0.
         revolute: (n,) True where s = tan((q - q*) / 2), False where s = q - q*.
         q_lower, q_upper: (n,) the joint limits.
@@ -58,6 +59,7 @@ class Cells(NamedTuple):
     first: NDArray[np.int32]
     tree: NDArray[np.int32]
     normals: Floats
+    spans: NDArray[np.int32]
     q_star: Floats
     revolute: NDArray[np.bool_]
     q_lower: Floats
@@ -84,6 +86,16 @@ def nodes_of(joint: NDArray[np.int16], cut: Floats, upper: NDArray[np.int32]) ->
     return nodes, number
 
 
+def spans_of(normals: Floats) -> NDArray[np.int32]:
+    """Returns the first joint for which each normal is not 0, and the one behind the last, (O, 2)."""
+    O, n = normals.shape
+    if not O:
+        return np.zeros((0, 2), np.int32)
+    moved = normals != 0
+    first, behind = moved.argmax(axis=1), n - moved[:, ::-1].argmax(axis=1)
+    return np.where(moved.any(axis=1)[:, None], np.stack([first, behind], axis=1), 0).astype(np.int32)
+
+
 @njit(cache=True, nogil=True)
 def points(cells: Cells, X: Floats, found: NDArray[np.bool_]) -> None:
     """Fills in which configurations (m, n) are within the joint limits and free.
@@ -103,7 +115,7 @@ def points(cells: Cells, X: Floats, found: NDArray[np.bool_]) -> None:
             i, leaf, near = left[place], OPEN, False
             for number in range(begin, end):
                 if leaf == OPEN:
-                    leaf, close = _leaf(nodes, tolerance, cells.normals, cells.root[cells.tree[number]], X[i], S[i])
+                    leaf, close = _leaf(cells, nodes, tolerance, cells.root[cells.tree[number]], X[i], S[i])
                     near = near or close
             if near:
                 open_parts = _open_in_clause(cells, clause, X[i], X[i], True, stack, room[0], room[1])[1]
@@ -117,13 +129,13 @@ def points(cells: Cells, X: Floats, found: NDArray[np.bool_]) -> None:
 
 
 @njit(cache=True)
-def _leaf(nodes: NDArray[np.void], tolerance: Floats, normals: Floats, root: int, x: Floats, s: Floats) -> tuple[int, bool]:
+def _leaf(cells: Cells, nodes: NDArray[np.void], tolerance: Floats, root: int, x: Floats, s: Floats) -> tuple[int, bool]:
     """Returns the leaf of a tree that a configuration is in, and whether it is nearer to a cut of a joint than the tolerance."""
     node, near = root, False
     while node >= 0:
         at = nodes[node]
         if at.joint == OBLIQUE:
-            if along(normals[at.upper], s) <= at.cut:
+            if along(cells, at.upper, s) <= at.cut:
                 return PROVED, near
             node = lower_part(nodes, node)
             continue
@@ -134,11 +146,11 @@ def _leaf(nodes: NDArray[np.void], tolerance: Floats, normals: Floats, root: int
 
 
 @njit(cache=True)
-def along(normal: Floats, s: Floats) -> float:
-    """Returns where a configuration is along a normal."""
+def along(cells: Cells, row: int, s: Floats) -> float:
+    """Returns where a configuration is along the normal of an oblique cut."""
     t = 0.0
-    for j in range(len(s)):
-        t += normal[j] * s[j]
+    for j in range(cells.spans[row, 0], cells.spans[row, 1]):
+        t += cells.normals[row, j] * s[j]
     return t
 
 
@@ -265,7 +277,7 @@ def _open_in_tree(
         if node >= 0:
             j, v, upper = nodes[node].joint, nodes[node].cut, nodes[node].upper
             if j == OBLIQUE:
-                beyond = _beyond(cells, cells.normals[upper], v, x, y, a, b)
+                beyond = _beyond(cells, upper, v, x, y, a, b)
                 node = PROVED if beyond[0] > beyond[1] else lower_part(nodes, node)
                 if beyond[2] <= beyond[3]:
                     waiting[top], spans[top, 0], spans[top, 1] = node, beyond[2], beyond[3]
@@ -316,28 +328,26 @@ def _open_in_tree(
 
 
 @njit(cache=True)
-def _beyond(
-    cells: Cells, normal: Floats, value: float, x: Floats, y: Floats, begin: float, end: float
-) -> tuple[float, float, float, float]:
-    """Returns where a motion may be beyond an oblique cut: two ranges of t, in order, of which both or the second one may be empty.
+def _beyond(cells: Cells, row: int, value: float, x: Floats, y: Floats, begin: float, end: float) -> tuple[float, float, float, float]:
+    """Returns where a motion may be beyond an oblique cut: two ranges of t, in order, of which both or the second one may be empty."""
+    first, last, bent = _ends(cells, row, value, x, y, begin, end)
+    if max(first, last) + bent <= 0:
+        return np.inf, -np.inf, np.inf, -np.inf
+    if min(first, last) - bent > 0:
+        return begin, end, np.inf, -np.inf
+    return _passed(cells, row, value, x, y, begin, end)
 
-    In a part of the motion, s_j is monotone, and |s_j''| = way_j^2 / 2 |s_j| (1 + s_j^2) is largest at an end. So normal . s is nowhere
-    farther from its chord than an eighth of the sum of |normal_j| times these, times the square of the part's length.
-    """
-    n, found = len(x), (np.inf, -np.inf, np.inf, -np.inf)
-    ends, level, waiting = np.empty((2, n)), np.zeros(HALVINGS + 2, np.int64), np.empty((HALVINGS + 2, 2))
+
+@njit(cache=True)
+def _passed(cells: Cells, row: int, value: float, x: Floats, y: Floats, begin: float, end: float) -> tuple[float, float, float, float]:
+    """Does as :func:`_beyond` for a motion that may pass the cut."""
+    found = (np.inf, -np.inf, np.inf, -np.inf)
+    level, waiting = np.zeros(HALVINGS + 2, np.int64), np.empty((HALVINGS + 2, 2))
     waiting[0, 0], waiting[0, 1], top = begin, end, 1
     while top:
         top -= 1
         a, b, halvings = waiting[top, 0], waiting[top, 1], level[top]
-        fill_s(cells, x, y, a, ends[0])
-        fill_s(cells, x, y, b, ends[1])
-        first, last, bent = along(normal, ends[0]) - value, along(normal, ends[1]) - value, 0.0
-        for j in range(n):
-            if cells.revolute[j]:
-                s = max(abs(ends[0, j]), abs(ends[1, j]))
-                bent += abs(normal[j]) * (y[j] - x[j]) ** 2 / 2 * s * (1 + s * s)
-        bent *= (b - a) ** 2 / 8
+        first, last, bent = _ends(cells, row, value, x, y, a, b)
         if max(first, last) + bent <= 0:
             continue
         if min(first, last) - bent <= 0 and a < b:
@@ -359,6 +369,25 @@ def _beyond(
         else:
             found = found[0], found[1], min(found[2], a), b
     return found
+
+
+@njit(cache=True)
+def _ends(cells: Cells, row: int, value: float, x: Floats, y: Floats, a: float, b: float) -> tuple[float, float, float]:
+    """Returns how far beyond an oblique cut a part of a motion begins and ends, and how far it may be from its chord along the normal.
+
+    In a part, s_j is monotone, and |s_j''| = way_j^2 / 2 |s_j| (1 + s_j^2) is largest at an end. So normal . s is nowhere farther from its
+    chord than an eighth of the sum of |normal_j| times these, times the square of the part's length.
+    """
+    first, last, bent = -value, -value, 0.0
+    for j in range(cells.spans[row, 0], cells.spans[row, 1]):
+        normal, way = cells.normals[row, j], y[j] - x[j]
+        begin, end = in_s(cells, j, x[j] + a * way), in_s(cells, j, x[j] + b * way)
+        first += normal * begin
+        last += normal * end
+        if cells.revolute[j]:
+            s = max(abs(begin), abs(end))
+            bent += abs(normal) * way**2 / 2 * s * (1 + s * s)
+    return first, last, bent * (b - a) ** 2 / 8
 
 
 @njit(cache=True)

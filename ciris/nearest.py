@@ -317,7 +317,7 @@ def _open_at(cells: Cells, root: int, x: Floats, found: Floats, room: Room) -> b
         if node >= 0:
             j, v, upper = cells.nodes[node].joint, cells.nodes[node].cut, cells.nodes[node].upper
             if j == OBLIQUE:
-                if along(cells.normals[upper], room.s) <= v - INSIDE:
+                if along(cells, upper, room.s) <= v - INSIDE:
                     node = PROVED
                     continue
                 if seen.many[0] < FACES:
