@@ -154,16 +154,23 @@ class Trees:
 
     def __init__(self, scene: Scene, former: MapProof | None = None) -> None:
         self.scene, self.trees, self.taken_over = scene, dict[Pairs, Tree](), list[Pairs]()
+        self._pairs = dict[Pairs, PairTree]()
         self._former = {} if former is None else _some(former)
 
     def tree(self, pairs: Pairs) -> Tree:
         """Returns the tree of some pairs, a new one if there is none."""
         if pairs not in self.trees:
-            pair = PairTree(self.scene, pairs)
+            pair = self.pair(pairs)
             tree = self.trees[pairs] = Tree.of(pair, self._former.get(pair.scene.hash))
             if len(tree.found) > 1:
                 self.taken_over.append(pairs)
         return self.trees[pairs]
+
+    def pair(self, pairs: Pairs) -> PairTree:
+        """Returns what the cells of some pairs are tried with."""
+        if pairs not in self._pairs:
+            self._pairs[pairs] = PairTree(self.scene, pairs)
+        return self._pairs[pairs]
 
     @property
     def planes(self) -> int:
@@ -313,7 +320,7 @@ class Growing(Trees):
         self._samples = np.concatenate([self._samples, samples])
         self._value = np.concatenate([self._value, np.full(len(samples), value)])
         self._open = np.concatenate([self._open, np.zeros(len(samples), np.int64)])
-        for pairs, places in self._plan.assigned(samples).items():
+        for pairs, places in self._plan.assigned(samples, lambda pairs: self.pair(pairs).joints).items():
             self._open[self.tree(pairs).insert(begin + places, samples[places])] += 1
         return len(samples)
 

@@ -181,6 +181,11 @@ class PairTree:
         scales = np.array([np.where(revolute, 1.0, each.extent) for each in bodies])
         self._levels = Levels(len(bodies), np.array(choices, np.int8), scales, revolute, len(bodies[0].joints) >= MANY_JOINTS, two_chains)
 
+    @property
+    def joints(self) -> int:
+        """Returns how many joints move the fattest volumes of the tree."""
+        return len(self._pairs[self._levels.number - 1].joints)
+
     def root(self, numbers: Array) -> OpenCells:
         """Returns the cell of all configurations within the joint limits, with samples of these numbers."""
         cells = self.cells(self._area.lower[None].copy(), self._area.upper[None].copy())

@@ -7,6 +7,7 @@ of them are apart is proved for every pair between them. So each sample goes to 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 
 import numpy as np
 
@@ -18,7 +19,9 @@ ROOM = 0.02
 """Volumes of several geometries are apart for a sample if they are apart by this, in metres."""
 SHARE = 0.01
 """They get a tree of their own if they are apart at this share of all samples."""
-
+FEW_JOINTS = 5
+"""And if at most this many joints move the fattest volumes of this tree. With more joints it takes far more cells than the trees of halves,
+whose fat volumes are apart more often."""
 
 Pairs = tuple[Pair, ...]
 """The pairs of one tree."""
@@ -29,7 +32,8 @@ Names = tuple[str, ...]
 class Plan:
     """Says which trees configurations are for, and which configurations are free of collision.
 
-    Volumes of several geometries get a tree if they are apart at SHARE of the first configurations that are assigned.
+    Volumes of several geometries get a tree if they are apart at SHARE of the first configurations that are assigned, and if it has
+    fat volumes that at most FEW_JOINTS joints move.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -45,22 +49,30 @@ class Plan:
             left = np.setdiff1d(left, self._touching(first, second, samples, left))
         return np.isin(np.arange(len(samples)), left)
 
-    def assigned(self, samples: Array) -> dict[Pairs, Array]:
+    def assigned(self, samples: Array, joints: Callable[[Pairs], int]) -> dict[Pairs, Array]:
         """Returns which configurations each tree is for, by their numbers; a configuration has one tree for each pair.
 
         Args:
             samples: (S, n) in s, free of collision.
+            joints: says how many joints move the fattest volumes that a tree of some pairs has.
         """
         found: dict[Pairs, Array] = {}
         chosen: set[Pairs] = set()
         for first, second in self._parts:
-            self._assign(first, second, samples, np.arange(len(samples)), found, chosen)
+            self._assign(first, second, samples, np.arange(len(samples)), joints, found, chosen)
         if self._chosen is None:
             self._chosen = chosen
         return found
 
     def _assign(
-        self, first: Geometries, second: Geometries, samples: Array, numbers: Array, found: dict[Pairs, Array], chosen: set[Pairs]
+        self,
+        first: Geometries,
+        second: Geometries,
+        samples: Array,
+        numbers: Array,
+        joints: Callable[[Pairs], int],
+        found: dict[Pairs, Array],
+        chosen: set[Pairs],
     ) -> None:
         pairs = self._between(first, second)
         if not pairs or not len(numbers):
@@ -70,13 +82,14 @@ class Plan:
             return
         if self._chosen is None or pairs in self._chosen:
             room = self._gaps(first, second, samples[numbers])
-            if room is not None and (self._chosen is not None or (room > ROOM).sum() >= SHARE * len(samples)):
+            often = room is not None and (room > ROOM).sum() >= SHARE * len(samples)
+            if room is not None and (self._chosen is not None or (often and joints(pairs) <= FEW_JOINTS)):
                 chosen.add(pairs)
                 if (room > ROOM).any():
                     found[pairs] = numbers[room > ROOM]
                 numbers = numbers[room <= ROOM]
         for one, other in _divided(first, second):
-            self._assign(one, other, samples, numbers, found, chosen)
+            self._assign(one, other, samples, numbers, joints, found, chosen)
 
     def _touching(self, first: Geometries, second: Geometries, samples: Array, numbers: Array) -> Array:
         """Returns the numbers of configurations at which two of the geometries are not shown to be apart."""

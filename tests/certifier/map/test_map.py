@@ -13,7 +13,7 @@ from certifier.errors import ProofError
 from certifier.jobs.map import _adopted, grow_map, grow_round, ways_of
 from certifier.map.free_set import as_file, free_set
 from certifier.map.growing import Growing
-from certifier.map.trees import Plan
+from certifier.map.trees import FEW_JOINTS, Plan
 from certifier.model import WORLD, Joint, JointKind, Pair
 from certifier.pair.collisions import in_collision
 from certifier.proof import limits
@@ -159,6 +159,18 @@ def test_a_pair_that_is_ignored_leaves_the_others_of_its_bodies(ignored):
     assert not (free & collides).any()
     assert (free | collides).mean() > 0.999
     assert grow_map(scene, 0.9, deadline_s=20).reason == "coverage"
+
+
+@pytest.mark.parametrize("joints", [FEW_JOINTS, FEW_JOINTS + 1])
+def test_geometries_share_a_tree_where_few_joints_move_their_fattest_volumes(joints):
+    scene = hand()
+    samples = samples_of(scene, 2000)
+    samples = samples[Plan(scene).free(samples)]
+    found = Plan(scene).assigned(samples, lambda pairs: joints)
+    assert any(len(pairs) > 1 for pairs in found) == (joints <= FEW_JOINTS)
+    for pair in scene.pairs:
+        numbers = np.concatenate([places for pairs, places in found.items() if pair in pairs])
+        assert sorted(numbers) == list(range(len(samples))), "each configuration has one tree for each pair"
 
 
 def test_bodies_that_always_touch_have_no_cells():
