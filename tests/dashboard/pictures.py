@@ -1,6 +1,6 @@
 """``python -m tests.dashboard.pictures`` takes the pictures of docs/dashboard.md from a real run, and times the first view of each page.
 
-It starts a service of its own, has regions grown for some minutes, and looks at the pages in the tests' Chromium. With names of pictures
+It starts a service of its own, grows regions for some minutes, and looks at the pages in the tests' Chromium. With names of pictures
 as arguments it takes only these.
 """
 
@@ -191,7 +191,7 @@ PICTURES = (
 
 
 def shoot(browser: Browser, address: str, picture: Picture) -> None:
-    """Takes a picture, and says how long it took until something was to be seen, and until the page was complete."""
+    """Takes a picture, and says how long it took until the page showed something, and until it was complete."""
     context = browser.new_context(viewport=picture.size, color_scheme=picture.scheme, device_scale_factor=1)
     page = context.new_page()
     page.set_default_timeout(PATIENCE_MS)
