@@ -44,7 +44,7 @@ def lately(session: Session) -> dict[str, float]:
 
 
 def _remembered(row: SolverTimeRow, now: datetime) -> float:
-    """Returns what is left of the seconds that a row has lately."""
+    """Returns the seconds that a row has lately, as they count now."""
     if row.counted_at is None:
         return 0.0
     return row.lately * 0.5 ** (max((now - row.counted_at).total_seconds(), 0.0) / HALF_LIFE_SECONDS)

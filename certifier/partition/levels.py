@@ -49,7 +49,7 @@ class Levels(NamedTuple):
     two_chains: bool
 
 
-def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume], apart: tuple[float, float] = APART) -> Levels:
+def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume], apart: tuple[float, float] = APART, by: float = 0.0) -> Levels:
     """Returns the levels of two volumes: of fewer than LONG joints, that of the volumes themselves alone.
 
     Of two chains, there is one for every number of joints with which balls are apart at most configurations. So slim levels are kept
@@ -59,6 +59,7 @@ def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume], apart: tup
     Args:
         frame: any body; distances are computed in its frame.
         apart: as APART.
+        by: balls count as apart where they are so by more than this, in metres.
     """
     kinematics, (a, b) = area.kinematics, volumes
     if len(kinematics.chain(a.body, b.body)) < LONG:
@@ -81,17 +82,17 @@ def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume], apart: tup
     for _, alternatives in itertools.groupby(candidates, key=moving):
         room = {level: _room(area, frame, (known[0][level[0]], known[1][level[1]]), apart) for level in alternatives}
         best = max(room, key=lambda level: float(room[level][shares[0]]))
-        if room[best][shares[0]] > 0:
+        if room[best][shares[0]] > by:
             fats.append(best)
         if not two_chains:
-            shares = [share for share in shares if room[best][share] <= 0]
+            shares = [share for share in shares if room[best][share] <= by]
         if not shares:
             break
     return Levels((first, second), levels + fats[::-1], len(levels), two_chains)
 
 
 def _room(area: Area, frame: str, volumes: tuple[Volume, Volume], apart: tuple[float, float]) -> Array:
-    """Returns how far apart the volumes are at each of these shares of the configurations, in metres; not positive if they touch."""
+    """Returns how far apart the volumes are at each of these shares of the configurations, in metres; not positive where they touch."""
     padding = area.scene.padding_between(volumes)
     hulls = [hull(area.kinematics, frame, v, v.radius + padding, np.zeros(3), 1.0) for v in volumes]
     room: Array = np.quantile(gaps(*hulls, area.samples[:LOOKED]), [1 - share for share in apart])
