@@ -22,6 +22,8 @@ from certifier.isolation import landlock, seccomp
 
 MOST_WRITTEN = 2**28
 """A child may write this many bytes of its answer, and of any file, its log among them."""
+NICENESS = 5
+"""Who reads files of strangers goes after the program that answers requests, and before solvers (workers.processes)."""
 _MOST_FILES, _MOST_THREADS = 256, 64
 _LONGEST_S = 2**31
 """A limit of the processor's time in seconds that is as good as none."""
@@ -99,6 +101,8 @@ def confine(confinement: Confinement | None) -> None:
     if sys.platform != "linux":
         return
     strange = confinement is not None and confinement.strange
+    if strange:
+        os.nice(NICENESS)
     namespaces = strange and _alone_in_namespaces()
     _drop_capabilities(0 if strange else _READ_ALL)
     ctypes.CDLL(None).prctl(_NO_NEW_PRIVILEGES, 1, 0, 0, 0)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from certifier.isolation.child import run_in_child
-from certifier.isolation.confinement import Confinement, Layers, probed
+from certifier.isolation.confinement import NICENESS, Confinement, Layers, probed
 
 SECRET = "postgresql://ciris:a-secret@database/ciris"
 TAKEN_OVER = """
@@ -72,6 +72,7 @@ def attack(payload):
         "signal": [tried(lambda: os.kill(pid, 0)) for pid in others],
         "limits of others": [tried(lambda: resource.prlimit(pid, resource.RLIMIT_CORE)) for pid in others],
         "trace": ctypes.CDLL(None).ptrace(16, others[0], 0, 0),
+        "niceness": os.nice(0),
         "limits": {name: resource.getrlimit(getattr(resource, "RLIMIT_" + name))[0] for name in ("AS", "CPU", "FSIZE", "NOFILE", "CORE")},
     }
 """
@@ -109,6 +110,7 @@ def test_who_reads_strange_files_finds_no_secret_and_reaches_nobody(tried: Any) 
     assert "a-secret" not in str({name: found[name] for name in ("variables", "descriptors")})
     assert found["write in its directory"] == "written"
     assert found["limits"] == {"AS": 2**31, "CPU": 31, "FSIZE": 2**28, "NOFILE": 256, "CORE": 0}
+    assert found["niceness"] == min(19, os.nice(0) + NICENESS)
     if on.landlock:
         for name in ("passwords", "home", "file of another", "write outside"):
             assert found[name] == "refused: PermissionError", name
