@@ -42,8 +42,11 @@ def url(provider: RealProvider, database: Database, client: TestClient) -> Itera
 
 
 @pytest.fixture(params=[{}])
-def visitor(browser: Any, request: pytest.FixtureRequest) -> Iterator[Any]:
-    """A page that may complain of nothing. The provider's own pages ask another machine for a style sheet, and get an empty one."""
+def visitor(browser: Any, url: str, request: pytest.FixtureRequest) -> Iterator[Any]:
+    """A page that may complain of nothing, closed before the service is.
+
+    The provider's own pages ask another machine for a style sheet, and get an empty one.
+    """
     context = browser.new_context(**request.param)
     context.route("https://cdn.jsdelivr.net/**", lambda route: route.fulfill(content_type="text/css", body=""))
     page, complaints = context.new_page(), []
