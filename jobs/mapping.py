@@ -29,7 +29,6 @@ from certifier.map.packed import Entry, pack_entries, pack_tasks, unpack_entries
 from certifier.map.pair import Found
 from certifier.model import Scene
 from certifier.proof.map import MapProof
-from certifier.proof.partition import PLANE
 from certifier.proof.sub_scene import contents_of
 from certifier.verify.map import verify_map
 from ciris.free_set import FreeSet
@@ -303,8 +302,7 @@ def accept(claim: steps.Claim, scene: Scene) -> Done:
         for data in found.values():
             for entry in unpack_entries(scene, data):
                 trees.tree(entry.pairs).take(entry.nodes, entry.found)
-    together = trees.proof()
-    proof, cells = together.to_bytes(), _cells_of(together)
+    proof, cells = trees.proof().to_bytes(), _cells_of(trees)
     statement, file = verify_map(proof), _free_set_of(proof)
     states = states_of(trees, in_s(scene, options.at))
     report = {
@@ -326,12 +324,12 @@ def accept(claim: steps.Claim, scene: Scene) -> Done:
     return Done(report, save)
 
 
-def _cells_of(proof: MapProof) -> Counter[str]:
+def _cells_of(trees: Trees) -> Counter[str]:
     """Returns how many cells of a map have a plane, by what their pairs are about."""
-    contents, cells = contents_of(proof.scene), Counter[str]()
-    for pairs, part in zip(proof.pairs, proof.maps, strict=True):
+    contents, cells = contents_of(trees.scene), Counter[str]()
+    for pairs, tree in trees.trees.items():
         for pair in pairs:
-            cells[contents[pair]] += int(np.count_nonzero(part.nodes == PLANE))
+            cells[contents[pair]] += tree.descent.held
     return +cells
 
 

@@ -135,7 +135,7 @@ class Tree:
         self.found.append(found.proved)
 
 
-def _some(former: MapProof) -> dict[str, PairMap]:
+def _as_fits(former: MapProof) -> dict[str, PairMap]:
     """Returns the maps of a former map by what they are about, as many as leave room for new cells."""
     sizes = np.cumsum([sum(getattr(part, name).nbytes for name in (*STREAMS, "normals")) for part in former.maps])
     return {part.scene.hash: part for part, size in zip(former.maps, sizes, strict=True) if size <= TAKEN_OVER * limits.UNPACKED_BYTES}
@@ -155,7 +155,7 @@ class Trees:
     def __init__(self, scene: Scene, former: MapProof | None = None) -> None:
         self.scene, self.trees, self.taken_over = scene, dict[Pairs, Tree](), list[Pairs]()
         self._pairs = dict[Pairs, PairTree]()
-        self._former = {} if former is None else _some(former)
+        self._former = {} if former is None else _as_fits(former)
 
     def tree(self, pairs: Pairs) -> Tree:
         """Returns the tree of some pairs, a new one if there is none."""

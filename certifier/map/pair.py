@@ -31,7 +31,7 @@ SAMPLES = 500
 APART = (0.3, 0.7)
 """The fattest balls of a tree are apart at the first share of all configurations, the next ones at the second share
 (certifier.partition.levels). Cells in which they touch mostly are tried with the next level."""
-BY = 0.03
+APART_BY = 0.03
 """They are apart by more than this, in metres. Where balls are nearer, only narrow cells have planes."""
 PIECES = 25
 """A vertex may take this many pieces; a cell that needs more is cut, because its pieces take longer to verify than those of two cells."""
@@ -172,7 +172,7 @@ class PairTree:
         self._area = limits_of(self.scene)
         self._volumes = volumes_of(self.scene, self.scene.pairs)
         self._frame, _ = choose_frame(self._area.kinematics, self._volumes, self._area.lower, self._area.upper)
-        self._coarse, levels, _, two_chains = levels_of(self._area, self._frame, self._volumes, APART, BY)
+        self._coarse, levels, _, two_chains = levels_of(self._area, self._frame, self._volumes, APART, APART_BY)
         chosen = choices_of(self._volumes, self._coarse)
         choices = [i + (1 + len(self._coarse[0])) * j for i, j in levels[:1] + levels[1:][-LEVELS + 1 :]]
         bodies = [Bodies(self._area, self._frame, chosen[choice]) for choice in choices]

@@ -82,8 +82,8 @@ class Plan:
             return
         if self._chosen is None or pairs in self._chosen:
             room = self._gaps(first, second, samples[numbers])
-            often = room is not None and (room > ROOM).sum() >= SHARE * len(samples)
-            if room is not None and (self._chosen is not None or (often and joints(pairs) <= FEW_JOINTS)):
+            settled = self._chosen is not None
+            if room is not None and (settled or ((room > ROOM).sum() >= SHARE * len(samples) and joints(pairs) <= FEW_JOINTS)):
                 chosen.add(pairs)
                 if (room > ROOM).any():
                     found[pairs] = numbers[room > ROOM]

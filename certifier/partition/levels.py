@@ -49,7 +49,7 @@ class Levels(NamedTuple):
     two_chains: bool
 
 
-def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume], apart: tuple[float, float] = APART, by: float = 0.0) -> Levels:
+def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume], apart: tuple[float, float] = APART, apart_by: float = 0.0) -> Levels:
     """Returns the levels of two volumes: of fewer than LONG joints, that of the volumes themselves alone.
 
     Of two chains, there is one for every number of joints with which balls are apart at most configurations. So slim levels are kept
@@ -59,7 +59,7 @@ def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume], apart: tup
     Args:
         frame: any body; distances are computed in its frame.
         apart: as APART.
-        by: balls count as apart where they are so by more than this, in metres.
+        apart_by: balls count as apart where they are so by more than this, in metres.
     """
     kinematics, (a, b) = area.kinematics, volumes
     if len(kinematics.chain(a.body, b.body)) < LONG:
@@ -82,10 +82,10 @@ def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume], apart: tup
     for _, alternatives in itertools.groupby(candidates, key=moving):
         room = {level: _room(area, frame, (known[0][level[0]], known[1][level[1]]), apart) for level in alternatives}
         best = max(room, key=lambda level: float(room[level][shares[0]]))
-        if room[best][shares[0]] > by:
+        if room[best][shares[0]] > apart_by:
             fats.append(best)
         if not two_chains:
-            shares = [share for share in shares if room[best][share] <= by]
+            shares = [share for share in shares if room[best][share] <= apart_by]
         if not shares:
             break
     return Levels((first, second), levels + fats[::-1], len(levels), two_chains)
