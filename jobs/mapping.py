@@ -143,6 +143,8 @@ def lead(claim: steps.Claim, scene: Scene) -> Done:
         led = _resumed(claim.job_id, scene, options)
         if led.begins:
             leading.begin(led)
+            account = account.then(before + time.monotonic() - begun, led.growing)
+            leading.tell(account)
         slice_s = max(SLICE_S, RESUMED * (time.monotonic() - begun))
         while (reason := grow_round(led.growing, partial(leading.work, led), options.coverage, leading.over)) is None:
             led.rounds += 1

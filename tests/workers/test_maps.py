@@ -299,6 +299,10 @@ def test_a_map_begins_with_the_one_of_the_project_that_proves_most_of_the_same_b
         job = ended(asked(client, scene, options={"coverage": 0.9}, former=None))
         assert job.options["former"] == former
         assert proof_of(client, job.id) == grow_map(scene, 0.9, former=expected).proof.to_bytes()
+    again = ended(asked(client, here, options={"coverage": 0.7}, former=None))
+    told = found(client, again.id)
+    assert told["coverage"]["value"] >= 0.7, "it is known although no round was needed"
+    assert 0 < told["cells"] == told["stored"]["cells"]
     anew = ended(asked(client, more, options={"coverage": 0.9}))
     assert (anew.options["former"], proof_of(client, anew.id)) == ("none", grow_map(more, 0.9).proof.to_bytes())
     assert few.outcome == "certified"
