@@ -1,4 +1,4 @@
-"""What Numba has compiled is forgotten here where it may be out of date: ``python -m certifier.compiled``.
+"""What Numba has compiled is forgotten here where it may be out of date: ``python -m certifier.compiled``. And who compiles can say so.
 
 Numba compiles a function again when its own file has changed. What the function calls from other files is in its machine code as well, and
 Numba does not look at these. So all is forgotten as soon as one of the files has changed.
@@ -7,9 +7,12 @@ Numba does not look at these. So all is forgotten as soon as one of the files ha
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from numba import config
+from numba.core import event
 from numba.core.caching import UserProvidedCacheLocator
 
 ROOT = Path(__file__).parents[1]
@@ -43,6 +46,24 @@ def forget_stale(root: Path = ROOT) -> int:
     stamp.parent.mkdir(parents=True, exist_ok=True)
     stamp.write_text(digest)
     return len(stale)
+
+
+@contextmanager
+def compiling(say: Callable[[], None]) -> Iterator[None]:
+    """Calls ``say`` in the block whenever this process begins to compile a function, rather than to load it."""
+    with event.install_listener("numba:compile", _Listener(say)):
+        yield
+
+
+class _Listener(event.Listener):
+    def __init__(self, say: Callable[[], None]) -> None:
+        self._say = say
+
+    def on_start(self, event: event.Event) -> None:
+        self._say()
+
+    def on_end(self, event: event.Event) -> None:
+        pass
 
 
 def _kept(path: Path) -> Path:

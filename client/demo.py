@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+import select
 import signal
 import subprocess
 import sys
@@ -32,6 +33,8 @@ DEADLINES_SECONDS = (120, 1200)
 """The region of seven joints would go on growing for minutes, so it has two. A busy machine that has no more than the box about the seed by
 then has twenty more."""
 STOP_SECONDS = 30
+LOOK_SECONDS = 0.5
+"""It looks this often whether a service that starts says why that takes long."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -127,11 +130,17 @@ def _stack() -> Iterator[str]:
     except OSError as error:
         hint = "name a directory that you may write to"
         raise CirisError("not_writable", f"{log.parent} cannot be made: {unreadable(error)}", field="CIRIS_DATA_DIR", hint=hint) from None
-    print("starting the service (the first time, it compiles for a minute or two) ...", flush=True)
+    print("starting the service ...", flush=True)
     with log.open("ab") as errors:
         stack = subprocess.Popen([sys.executable, "-P", "-m", "workers.stack"], stdout=subprocess.PIPE, stderr=errors, text=True)
     try:
         assert stack.stdout is not None
+        noted = 0
+        while not select.select([stack.stdout], [], [], LOOK_SECONDS)[0]:
+            notes = _said(log, before, "note: ")
+            for note in notes[noted:]:
+                print(note, flush=True)
+            noted = len(notes)
         if not stack.stdout.readline():
             raise CirisError("stack_failed", f"the service did not start{_last_error(log, before)}", hint=f"see {log}")
         url = running_stack(data_dir())
@@ -147,8 +156,14 @@ def _stack() -> Iterator[str]:
 
 def _last_error(log: Path, start: int) -> str:
     """Returns what the log says from here on about the error that ended the service; empty where it says nothing."""
-    said = [line for line in log.read_bytes()[start:].decode(errors="replace").splitlines() if line.startswith("error: ")]
-    return f": {said[-1].removeprefix('error: ')}" if said else ""
+    said = _said(log, start, "error: ")
+    return f": {said[-1]}" if said else ""
+
+
+def _said(log: Path, start: int, how: str) -> list[str]:
+    """Returns the lines for people that the log has from here on, of those that begin like this."""
+    lines = log.read_bytes()[start:].decode(errors="replace").splitlines()
+    return [line.removeprefix(how) for line in lines if line.startswith(how)]
 
 
 def _answers(url: str) -> bool:

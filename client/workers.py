@@ -79,7 +79,8 @@ def _row(worker: Document) -> tuple[str, ...]:
 def _state(worker: Document) -> str:
     """Returns what a worker does, and what it was asked to do where it has not done that yet."""
     state, wanted = plain(worker["state"]), plain(worker["wanted"])
-    return state if state == wanted else f"{state}, to be {wanted}"
+    comes = wanted == "running" and state in ("starting", "compiling")
+    return state if state == wanted or comes else f"{state}, to be {wanted}"
 
 
 def _work(work: Document) -> str:

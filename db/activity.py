@@ -20,6 +20,8 @@ from db.workers import WorkerKind
 WORKING = "working"
 QUEUED = "queued"
 STALLED = "stalled: its worker gives no sign of life"
+STARTING = "workers get ready"
+COMPILING = "workers compile, which takes some minutes, once"
 MOST_AHEAD = 1000
 """Where more jobs than this come first, their number is not told."""
 
@@ -104,6 +106,10 @@ def missing(counts: dict[tuple[str, str], int], kind: WorkerKind) -> str | None:
     """
     if counts[kind, WorkerState.RUNNING]:
         return None
+    if counts[kind, WorkerState.COMPILING]:
+        return COMPILING
+    if counts[kind, WorkerState.STARTING]:
+        return STARTING
     said = "control worker" if kind == WorkerKind.CONTROL and any(counts.values()) else "worker"
     return f"all {said}s paused" if counts[kind, WorkerState.PAUSED] else f"no {said}"
 

@@ -101,6 +101,10 @@ class WebhookState(StrEnum):
 
 
 class WorkerState(StrEnum):
+    STARTING = "starting"
+    """The worker loads what it calls, and takes no work yet. Nobody can want that of it."""
+    COMPILING = "compiling"
+    """It starts, and some of what it calls has to be compiled first, which takes minutes, once on a machine."""
     RUNNING = "running"
     """The worker takes work."""
     PAUSED = "paused"

@@ -24,8 +24,8 @@ from db.states import WORKER, WorkerState, sources
 
 GONE_SECONDS = 60.0
 """A worker that has said nothing for this many seconds is gone."""
-
-
+COMING = frozenset({WorkerState.STARTING, WorkerState.COMPILING})
+"""A worker in one of these states takes no work yet, and will by itself."""
 REACHING_QUEUE = "reaching the queue"
 """What a control worker that the queue does not answer says that fails."""
 
@@ -71,21 +71,28 @@ class Alike:
 def tell(session: Session, made: Made, state: WorkerState, trouble: str | None = None) -> WorkerState:
     """Says that a worker lives, what it does and what fails, and returns what is wanted of it.
 
-    A worker without a row, because it is new or was believed gone, gets one, and is wanted to go on with what it does.
+    A worker without a row, because it is new or was believed gone, gets one, and is wanted to go on with what it does, or to run if it
+    starts.
     """
     now = clock.now(session)
     known = update(WorkerRow).where(WorkerRow.process == made.process).values(state=state, trouble=trouble, seen_at=now)
     wanted = session.scalar(known.returning(WorkerRow.wanted))
     if wanted is None:
-        new = WorkerRow(id=str(uuid4()), **asdict(made), wanted=state, state=state, trouble=trouble, created_at=now, seen_at=now)
+        wanted = WorkerState.RUNNING if state in COMING else state
+        new = WorkerRow(id=str(uuid4()), **asdict(made), wanted=wanted, state=state, trouble=trouble, created_at=now, seen_at=now)
         session.add(new)
-        return state
     return WorkerState(wanted)
 
 
 def wanted(session: Session, process: str) -> WorkerState | None:
     """Returns what is wanted of the worker; None where it has no row."""
     found = session.scalar(select(WorkerRow.wanted).where(WorkerRow.process == process))
+    return None if found is None else WorkerState(found)
+
+
+def state(session: Session, process: str) -> WorkerState | None:
+    """Returns what the worker does, as it said last; None where it has no row."""
+    found = session.scalar(select(WorkerRow.state).where(WorkerRow.process == process))
     return None if found is None else WorkerState(found)
 
 

@@ -31,12 +31,14 @@ def main() -> None:
     from celery.signals import setup_logging, worker_process_init, worker_process_shutdown, worker_ready
     from celery.utils.log import get_multiprocessing_logger
 
+    from certifier.compiled import compiling
     from certifier.errors import CirisError
     from certifier.isolation.child import prepare
     from certifier.orphans import die_with_parent
     from db import logs, traces
     from db.session import check_version, database
     from db.settings import SPARE, settings
+    from db.states import WorkerState
     from db.workers import WorkerKind
     from workers.app import CONTROL, SOLVE, celery_app
     from workers.heartbeat import Heartbeat
@@ -55,12 +57,17 @@ def main() -> None:
     app = celery_app()
     register(app, queue)
     app.steps["worker"].add(Heartbeat)
+    troubles = Troubles()
+    presence = Presence(WorkerKind(queue), stop, troubles)
+    threading.Thread(target=presence.run, name="presence", daemon=True).start()
     forked = settings().solve_processes + SPARE
     pool = ["--pool=threads", "--concurrency=2"] if queue == CONTROL else ["--pool=prefork", f"--concurrency={forked}"]
     if queue == SOLVE:
         from certifier.jobs import kernels
 
-        kernels.warm_up()  # before it takes any work, and once for all processes that it forks
+        with compiling(lambda: presence.say(WorkerState.COMPILING)):
+            kernels.warm_up()  # before it takes any work, and once for all processes that it forks
+        presence.say(WorkerState.STARTING)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # Celery says there in plain lines that it was asked to end
     # It warns of a superuser's worker that would take pickled messages. Ours take JSON only.
     warnings.filterwarnings("ignore", category=SecurityWarning)
@@ -85,14 +92,11 @@ def main() -> None:
     def before_end(**_: Any) -> None:
         traces.end()
 
-    troubles = Troubles()
-    presence = Presence(WorkerKind(queue), stop, troubles)
-
     @worker_ready.connect(weak=False)
     def begin(sender: Any, **_: Any) -> None:
         if asked.background:
             give_way()
-        threading.Thread(target=presence.run, args=(sender,), name="presence", daemon=True).start()
+        presence.begin(sender)
         if queue == CONTROL:
             traces.configure(queue)
             from workers import checkpoints, sweeper, webhooks

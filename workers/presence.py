@@ -1,5 +1,7 @@
 """A worker says in the database that it lives and what it does, and does what people want of it: it runs, pauses or drains.
 
+It says so from its start on, also while it loads or compiles what it calls and takes no work yet.
+
 A paused worker takes no message from its queue, and a draining one ends with status 0 when it has finished what it holds. Messages that
 it leaves are there for the other workers: each worker that claims a piece and leaves more sends the next message. A worker whose database
 has been migrated to another version ends at once: it could not save what it finds.
@@ -55,19 +57,32 @@ class Presence:
         processes = settings().solve_processes if kind is WorkerKind.SOLVE else 1
         self._made = Made(this_worker(), kind, metadata.version("ciris"), processes, machine.cores(), machine.memory_bytes())
         self._ended, self._troubles = ended, troubles
-        self._state = self._wanted = WorkerState.RUNNING
+        self._state, self._wanted = WorkerState.STARTING, WorkerState.RUNNING
+        self._consumer: Any = None
+        self._news = threading.Event()
         self._told: float | None = None
-        self._told_of: str | None = None
+        self._told_of: tuple[WorkerState, str | None] | None = None
         self._database = Database(settings().database)
         self._visit = threading.Lock()
         os.register_at_fork(before=self._before_fork, after_in_parent=self._visit.release, after_in_child=self._visit.release)
 
-    def run(self, consumer: Any) -> None:
-        """Tells and listens until the worker ends.
+    def say(self, state: WorkerState) -> None:
+        """Tells what the worker does now, at once."""
+        if state is not self._state:
+            self._state = state
+            self._news.set()
+
+    def begin(self, consumer: Any) -> None:
+        """Tells that the worker takes work. From now on it does what is wanted of it.
 
         Args:
             consumer: Celery's, which takes the messages.
         """
+        self._consumer = consumer
+        self.say(WorkerState.RUNNING)
+
+    def run(self) -> None:
+        """Tells and listens until the worker ends."""
         while not self._ended.is_set():
             try:
                 with self._visit:
@@ -84,9 +99,11 @@ class Presence:
                 log.info("this worker holds nothing any more, and ends")
                 celery_state.should_stop = os.EX_OK
                 return
-            if self._wanted is not self._state:
-                consumer.call_soon(self._change, consumer)
-            self._ended.wait(LOOK_SECONDS if self._wanted is self._state else CHANGE_SECONDS)
+            changes = self._consumer is not None and self._wanted is not self._state
+            if changes:
+                self._consumer.call_soon(self._change, self._consumer)
+            self._news.wait(CHANGE_SECONDS if changes else LOOK_SECONDS)
+            self._news.clear()
 
     def leave(self) -> None:
         """Takes the worker out of the database. If that fails, it is forgotten after a while."""
@@ -102,16 +119,16 @@ class Presence:
         Raises:
             CirisError: database_version, when the database has been migrated to another version.
         """
-        trouble = self._troubles.said()
-        if self._told is not None and trouble == self._told_of and time.monotonic() - self._told < TELL_SECONDS:
+        now = self._state, self._troubles.said()
+        if self._told is not None and now == self._told_of and time.monotonic() - self._told < TELL_SECONDS:
             with self._database.read() as session:
                 version.check(session)
                 wanted = workers.wanted(session, self._made.process)
             if wanted is not None:
                 return wanted
         with self._database.write() as session:
-            wanted = workers.tell(session, self._made, self._state, trouble)
-        self._told, self._told_of = time.monotonic(), trouble
+            wanted = workers.tell(session, self._made, *now)
+        self._told, self._told_of = time.monotonic(), now
         return wanted
 
     def _change(self, consumer: Any) -> None:
@@ -123,7 +140,7 @@ class Presence:
         elif self._state is WorkerState.RUNNING:
             consumer.cancel_task_queue(self._made.kind.value)
         log.info("this worker was %s and is %s now", self._state, self._wanted)
-        self._state, self._told = self._wanted, None
+        self._state = self._wanted
 
     def _before_fork(self) -> None:
         self._visit.acquire()

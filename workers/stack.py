@@ -43,6 +43,7 @@ from db import keys, leases, logs, migrate, unusable, workers
 from db.disk import Disk, lacks_room
 from db.session import UNAVAILABLE, Database
 from db.settings import Settings, chosen
+from db.states import WorkerState
 from db.vault import kept_key
 from workers.processes import queue_server_command, queue_url
 from workers.reaper import Reaper
@@ -58,6 +59,7 @@ POLL_SECONDS = 0.2
 MAX_BACKOFF_SECONDS = 30.0
 HEALTHY_SECONDS = 30.0
 """A child that has run for this many seconds is started again without waiting when it dies."""
+COMPILES = "the solvers get ready: they compile, which takes some minutes, once"
 START_SECONDS = 60.0
 STOP_SECONDS = 8.0
 
@@ -139,12 +141,19 @@ class Child:
         self.process.wait()
 
 
-def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[str], None] = lambda url: None) -> None:
+def run_stack(
+    settings: Settings,
+    *,
+    port: int | None = None,
+    ready: Callable[[str], None] = lambda url: None,
+    note: Callable[[str], None] = lambda text: None,
+) -> None:
     """Runs the stack until SIGINT or SIGTERM. It must be called in the main thread.
 
     Args:
         port: the API's port; None takes the setting's port, or any free one when that is taken.
         ready: called once with the API's URL, when the API answers and the solve worker takes work.
+        note: called with a sentence that says why that takes long, where it does.
 
     Raises:
         CirisError: data_directory, no_room, stack_running, port_taken, no_keys, or stack_failed when the API does not come up.
@@ -163,7 +172,7 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
                 child.start(environment, data / "logs")
                 reaper.watch(_groups(children))
             _describe(data, url, children)
-            if _wait_until_healthy(url, stopping, data) and _wait_for_solver(children, settings, stopping):
+            if _wait_until_healthy(url, stopping, data) and _wait_for_solver(children, settings, stopping, note):
                 ready(url)
             _supervise(children, environment, data, url, reaper, stopping)
         finally:
@@ -268,18 +277,21 @@ def _wait_until_healthy(url: str, stopping: Callable[[], bool], data: Path) -> b
     return False
 
 
-def _wait_for_solver(children: list[Child], settings: Settings, stopping: Callable[[], bool]) -> bool:
-    """Waits until the solve worker has loaded what jobs call, which may have to be compiled first. The time of a job begins with the job.
+def _wait_for_solver(children: list[Child], settings: Settings, stopping: Callable[[], bool], note: Callable[[str], None]) -> bool:
+    """Waits until the solve worker has loaded what jobs call, and notes if it says that it compiles. The time of a job begins with the job.
 
     It does not wait for what has to be started again first. It returns False when the stack is to stop before.
     """
     (solver,) = (child.process for child in children if child.name == "solve")
     assert solver is not None, "all children are started"
-    database, name = Database(settings.database), leases.name_of(solver.pid)
+    database, name, said = Database(settings.database), leases.name_of(solver.pid), None
     while not stopping() and not any(child.dead for child in children):
         with suppress(*UNAVAILABLE), database.read() as session:
-            if workers.wanted(session, name) is not None:
+            before, said = said, workers.state(session, name) or said
+            if said not in {None, *workers.COMING}:
                 break
+            if said is WorkerState.COMPILING and before is not said:
+                note(COMPILES)
         time.sleep(POLL_SECONDS)
     database.close()
     return not stopping()
@@ -386,6 +398,15 @@ def _stop_signals() -> Iterator[Callable[[], bool]]:
             signal.signal(number, handler)
 
 
+def _say_up(url: str) -> None:
+    print(f"ciris is up at {url}", flush=True)
+
+
+def _say_note(text: str) -> None:
+    """Says it on standard error, so that the first line of the output still is the address."""
+    print(f"note: {text}", file=sys.stderr, flush=True)
+
+
 def main() -> None:
     """Runs ``python -m workers.stack``: the stack with the settings of the environment, until it gets a signal to stop."""
     parser = argparse.ArgumentParser(prog="python -m workers.stack", description="Runs ciris on this machine until Ctrl-C.")
@@ -396,7 +417,7 @@ def main() -> None:
     try:
         settings = chosen(arguments.data)
         try:
-            run_stack(settings, port=arguments.port, ready=lambda url: print(f"ciris is up at {url}", flush=True))
+            run_stack(settings, port=arguments.port, ready=_say_up, note=_say_note)
         except CirisError as error:
             raise settings.placed(error) from None
     except CirisError as error:

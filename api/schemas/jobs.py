@@ -44,8 +44,8 @@ class Job(BaseModel):
     state: JobState = Field(description="Where the job is. It is `running` from the first decision on, also while nobody works on it.")
     status: str = Field(
         description="What the job does now, in words for people. `working`: somebody works on it. `queued: ` goes on with why nobody does: "
-        "`no worker`, `no control worker`, `all workers paused`, `behind 3 others` or `next`. `stalled: ` goes on with what gives no sign "
-        "of life. Else it is the state.",
+        "`no worker`, `no control worker`, `all workers paused`, `workers compile, which takes some minutes, once`, `behind 3 others` or "
+        "`next`. `stalled: ` goes on with what gives no sign of life. Else it is the state.",
         examples=["queued: no worker"],
     )
     outcome: Outcome | None = Field(description="Outcome for the polytope or the motion asked for; null before the job ends.")

@@ -27,7 +27,7 @@ class Worker(BaseModel):
     busy: int = Field(description="Number of pieces of work that its processes hold now, for all projects. A decision is none.")
     cores: int = Field(description="Cores that it may use.")
     memory_bytes: int = Field(description="Memory that all processes on its machine, or in its container, may use together.")
-    state: WorkerState = Field(description="What it does, as it said last.")
+    state: WorkerState = Field(description="What it does, as it said last. One that starts or compiles takes no work yet.")
     wanted: WorkerState = Field(description="What it was asked to do. It learns of it within seconds.")
     trouble: str | None = Field(description="What fails of what it does again and again, such as its sweep; null where all goes well.")
     started_at: datetime = Field(description="When it began.")
@@ -60,6 +60,7 @@ class WorkerPage(Page):
 
     workers: list[Worker] = Field(description="The workers.")
     missing: list[str] = Field(
-        description="What keeps jobs waiting, in the words of their `status`: `no worker`, `no control worker`, `all workers paused` or "
-        "`all control workers paused`. Empty where workers of both kinds take work."
+        description="What keeps jobs waiting, in the words of their `status`: `no worker`, `no control worker`, `all workers paused`, "
+        "`all control workers paused`, `workers get ready` or `workers compile, which takes some minutes, once`. "
+        "Empty where workers of both kinds take work."
     )

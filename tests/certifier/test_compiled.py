@@ -40,3 +40,11 @@ def test_a_function_is_compiled_again_when_one_that_it_calls_has_changed(tmp_pat
     python("-m", "certifier.compiled")
     assert not list(tmp_path.rglob("*.nb[ic]"))
     assert found() == "2"
+
+
+def test_a_function_that_is_compiled_says_so_and_one_that_is_loaded_does_not(tmp_path: Path) -> None:
+    (tmp_path / "called.py").write_text(CALLED.format(1))
+    code = "from certifier.compiled import compiling; from called import f\nwith compiling(lambda: print('compiles')): print(f())"
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": f"{tmp_path}:{COMPILED.parents[1]}"}
+    said = [subprocess.run([sys.executable, "-c", code], env=environment, check=True, capture_output=True, text=True).stdout for _ in "12"]
+    assert said == ["compiles\n1\n", "1\n"]

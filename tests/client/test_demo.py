@@ -13,6 +13,7 @@ from certifier.errors import CirisError
 from certifier.outcome import DEADLINE
 from client import demo, service
 from tests.client.conftest import PLANAR, surroundings
+from workers.stack import COMPILES
 
 SCRIPT = f"import sys, pathlib, client.demo as demo; demo.SCENE = pathlib.Path({str(PLANAR)!r}); sys.exit(demo.main(['--once']))"
 
@@ -41,6 +42,16 @@ def test_a_busy_machine_gets_more_time_before_it_is_told_to_come_back(monkeypatc
     assert asked == [120, 1200] * 4
     answers[:] = [region]
     assert demo._grown(None, {}) is region
+
+
+def test_a_first_start_says_that_the_solvers_compile(tmp_path: Path) -> None:
+    environment = surroundings(CIRIS_DATA_DIR=str(tmp_path / "data"), NUMBA_CACHE_DIR=str(tmp_path / "compiled"))
+    with subprocess.Popen([sys.executable, "-c", SCRIPT], cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True) as start:
+        try:
+            assert start.stdout is not None
+            assert [start.stdout.readline() for _ in range(2)] == ["starting the service ...\n", f"{COMPILES}\n"]
+        finally:
+            start.terminate()
 
 
 @pytest.mark.slow

@@ -97,6 +97,14 @@ def test_the_page_says_which_worker_is_missing(client: TestClient, database: Dat
     with database.write() as session:
         workers.tell(session, control, WorkerState.RUNNING)
     assert notices() == ["Jobs stay queued: no worker."], "a control worker solves nothing"
+    for state, said in ((WorkerState.STARTING, "get ready"), (WorkerState.COMPILING, "compile, which takes some minutes, once")):
+        with database.write() as session:
+            workers.tell(session, solver, state)
+        assert notices() == [f"Jobs stay queued: workers {said}."]
+        text = client.get("/workers/live").text
+        assert "Then they begin by themselves." in text
+        assert "python -m workers" not in text, "nothing is to be started"
+        assert f'<span class="badge {state}">{state}</span></td>' in text.replace("\n", ""), "nor is it to be anything else"
     with database.write() as session:
         workers.tell(session, solver, WorkerState.PAUSED)
     assert notices() == ["Jobs stay queued: all workers paused."]

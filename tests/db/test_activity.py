@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import timedelta
 
 import pytest
@@ -57,6 +58,20 @@ def test_a_job_that_has_not_begun_does_not_come_next_where_nobody_would_work_on_
         workers.leave(session, SOLVER.process)
         crew(session, SOLVER)
         assert does(session, new) == ["queued: next"]
+
+
+def test_a_worker_that_starts_is_there_and_takes_no_work_yet(db: Database) -> None:
+    with db.write() as session:
+        crew(session, CONTROL)
+        begun, new = a_running_job(session), a_job(session)
+        for state, said in ((WorkerState.STARTING, activity.STARTING), (WorkerState.COMPILING, activity.COMPILING)):
+            crew(session, SOLVER, state=state)
+            assert does(session, begun, new) == [f"queued: {said}"] * 2
+        other = replace(SOLVER, process="host:2:1")
+        crew(session, other, state=WorkerState.PAUSED)
+        assert does(session, begun) == [f"queued: {activity.COMPILING}"], "it goes on by itself, and nobody has to resume the other"
+        crew(session, other)
+        assert does(session, begun) == ["queued: next"]
 
 
 def test_a_worker_that_is_silent_for_a_minute_is_none(db: Database) -> None:

@@ -52,6 +52,18 @@ def test_a_worker_tells_and_is_told(db: Database) -> None:
         assert workers.tell(session, made(), WorkerState.PAUSED) is WorkerState.PAUSED, "it goes on as it was"
 
 
+def test_a_worker_that_starts_is_to_run(db: Database) -> None:
+    with db.write() as session:
+        for state in (WorkerState.STARTING, WorkerState.COMPILING):
+            assert workers.tell(session, made(), state) is WorkerState.RUNNING
+            assert workers.state(session, "there:1:2") is state
+            assert workers.solvers(session) == 0, "it takes no work yet"
+        (row,) = workers.page(session).rows
+        workers.ask(session, row.id, WorkerState.PAUSED)
+        assert workers.tell(session, made(), WorkerState.RUNNING) is WorkerState.PAUSED, "it learns of it when it runs"
+        assert workers.state(session, "there:2:2") is None
+
+
 def test_draining_cannot_be_taken_back(db: Database) -> None:
     worker = enter(db)
     for state in (WorkerState.DRAINING, WorkerState.DRAINING):

@@ -24,10 +24,11 @@ from api.metrics import METHODS, STATUSES
 from certifier.errors import CirisError
 from certifier.orphans import die_with_parent
 from certifier.scene import pack_bundle
+from db.activity import COMPILING
 from db.leases import _started
 from db.settings import Settings
 from tests.workers.service import ROOT, eventually
-from workers.stack import Child, _data_directory, _reserved_port
+from workers.stack import COMPILES, Child, _data_directory, _reserved_port
 
 COMMAND = [sys.executable, "-m", "workers.stack"]
 ASK_AGAIN_SECONDS = 0.2
@@ -112,6 +113,22 @@ def test_what_dies_is_started_again_what_is_drained_is_not_and_a_stop_leaves_not
     assert stack.process.wait(30) == 0
     assert gone(after)
     assert not (stack.data / "stack.json").exists()
+
+
+def test_a_first_start_says_that_the_solvers_compile(tmp_path: Path) -> None:
+    """Where nothing is compiled yet, the worker says so itself, and the command, the API and jobs pass it on."""
+    environment = os.environ | {"CIRIS_SOLVE_PROCESSES": "1", "CIRIS_API_PROCESSES": "1", "NUMBA_CACHE_DIR": str(tmp_path / "compiled")}
+    data = tmp_path / "data"
+    with subprocess.Popen([*COMMAND, "--data", str(data)], cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True) as stack:
+        try:
+            assert stack.stderr is not None
+            assert next(line for line in stack.stderr if line.startswith("note: ")) == f"note: {COMPILES}\n"
+            url = json.loads((data / "stack.json").read_text())["url"]
+            said = httpx.get(f"{url}/v1/workers").json()
+            assert said["missing"] == [COMPILING]
+            assert {worker["kind"]: worker["state"] for worker in said["workers"]} == {"solve": "compiling", "control": "running"}
+        finally:
+            stack.terminate()
 
 
 @pytest.fixture
