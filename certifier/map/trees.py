@@ -1,7 +1,8 @@
 """Which trees a map has, and which configurations each of them is grown for.
 
 The geometries of a rigid part are a hierarchy: all of them, halves of them, and so on to each alone. A cell in which volumes around many
-of them are apart is proved for every pair between them. So each sample goes to the fattest volumes that are apart there.
+of them are apart is proved for every pair between them. So each sample goes to the fattest volumes that are apart there. Of two parts, the
+wider one is divided first: boards that fill a room before a hand that is small beside them.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Array, Geometry, Pair, Scene, Volume
 from certifier.partition.together import gaps_between, halves, volumes_of
 
-ROOM = 0.02
+ROOM = 0.05
 """Volumes of several geometries are apart for a sample if they are apart by this, in metres."""
 SHARE = 0.01
 """They get a tree of their own if they are apart at this share of all samples."""
@@ -39,6 +40,7 @@ class Plan:
     def __init__(self, scene: Scene) -> None:
         self._scene, self._known = scene, {frozenset((pair.a, pair.b)): pair for pair in scene.pairs}
         self._volumes: dict[tuple[Names, Names], tuple[Volume, Volume] | None] = {}
+        self._reaches: dict[Names, float] = {}
         self._chosen: set[Pairs] | None = None
         self._parts = list(itertools.combinations(_rigid_parts(scene), 2))
 
@@ -88,7 +90,7 @@ class Plan:
                 if (room > ROOM).any():
                     found[pairs] = numbers[room > ROOM]
                 numbers = numbers[room <= ROOM]
-        for one, other in _divided(first, second):
+        for one, other in self._divided(first, second):
             self._assign(one, other, samples, numbers, joints, found, chosen)
 
     def _touching(self, first: Geometries, second: Geometries, samples: Array, numbers: Array) -> Array:
@@ -99,11 +101,27 @@ class Plan:
         numbers = numbers if room is None else numbers[room <= 0]
         if len(first) * len(second) == 1:
             return numbers
-        return np.concatenate([self._touching(*parts, samples, numbers) for parts in _divided(first, second)])
+        return np.concatenate([self._touching(*parts, samples, numbers) for parts in self._divided(first, second)])
 
     def _between(self, first: Geometries, second: Geometries) -> Pairs:
         asked = (self._known.get(frozenset((a.name, b.name))) for a in first for b in second)
         return tuple(pair for pair in asked if pair is not None)
+
+    def _divided(self, first: Geometries, second: Geometries) -> list[tuple[Geometries, Geometries]]:
+        """Returns the halves of the geometries that reach farther, each with all of the others."""
+        larger, other = sorted((first, second), key=self._reach, reverse=True)
+        return [(half, other) for half in halves(larger)]
+
+    def _reach(self, geometries: Geometries) -> float:
+        """Returns the diagonal of the box around the vertices of geometries, in metres; -1 for a single one, which has no halves."""
+        if len(geometries) == 1:
+            return -1.0
+        names = tuple(geometry.name for geometry in geometries)
+        if names not in self._reaches:
+            body, kinematics, here = geometries[0].body, Kinematics.of(self._scene), np.zeros((1, self._scene.n))
+            placed = [kinematics.points(body, each.body, each.vertices, here)[0] for each in geometries]
+            self._reaches[names] = float(np.linalg.norm(np.ptp(np.concatenate(placed), axis=0)))
+        return self._reaches[names]
 
     def _gaps(self, first: Geometries, second: Geometries, samples: Array) -> Array | None:
         """Returns how far the volumes around geometries are apart, in metres; None where not all between them are pairs of one padding."""
@@ -114,12 +132,6 @@ class Plan:
             self._volumes[key] = volumes_of(self._scene, pairs) if same else None
         volumes = self._volumes[key]
         return None if volumes is None else gaps_between(self._scene, *volumes, samples)
-
-
-def _divided(first: Geometries, second: Geometries) -> list[tuple[Geometries, Geometries]]:
-    """Returns the halves of the more geometries, each with all of the others."""
-    larger, other = (first, second) if len(first) >= len(second) else (second, first)
-    return [(half, other) for half in halves(larger)]
 
 
 def _rigid_parts(scene: Scene) -> list[list[Geometry]]:

@@ -173,6 +173,18 @@ def test_geometries_share_a_tree_where_few_joints_move_their_fattest_volumes(joi
         assert sorted(numbers) == list(range(len(samples))), "each configuration has one tree for each pair"
 
 
+def test_of_two_parts_the_wider_one_is_divided_first():
+    scene = hand()
+    *fingers, board = scene.geometries
+    boards = [replace(board, name=f"world/board{i}", vertices=board.vertices - (0.0, 3.8 * i, 0.0)) for i in range(2)]
+    pairs = tuple(Pair(finger.name, board.name) for board in boards for finger in fingers)
+    scene = replace(scene, geometries=(*fingers, *boards), pairs=pairs)
+    samples = samples_of(scene, 2000)
+    trees = Plan(scene).assigned(samples[Plan(scene).free(samples)], lambda pairs: 0)
+    for board in boards:
+        assert {Pair(finger.name, board.name) for finger in fingers} in map(set, trees)
+
+
 def test_bodies_that_always_touch_have_no_cells():
     scene = planar_arm(1, box("world/obstacle", WORLD, (0.3, 0.3, 0.3)))
     found = grow_map(scene, 0.9, deadline_s=10)
