@@ -17,6 +17,8 @@ SHELLS, EACH = np.geomspace(0.004, 1.0, 12), 40
 """A free configuration is looked for at these parts of the joints' half ranges from the seed, EACH times."""
 ROOM = (1e-3, 0.0)
 """A free configuration that is named has the first of these distances to contact, in metres, that is found. On contact, none can grow."""
+WIDTHS, NEARER = np.geomspace(1.0, 0.05, 10), 0.97
+"""Ways that leave the known one by these widths are tried EACH times: is a configuration free at this part of the distance already?"""
 STEPS = 8
 """What was found is moved back towards the seed in this many steps of bisection."""
 
@@ -142,8 +144,37 @@ def nearest_free(scene: Scene, clearance: Clearance, q: Array, room: float = 0.0
         found = [x for x in near if clearance.free(x, room)]
         if found:
             best = min(found, key=lambda x: float(np.linalg.norm((x - q) / half)))
-            return _towards(clearance, q, best, room)
+            return _nearer(clearance, q, best, room, (lower, upper), rng)
     return None
+
+
+def _nearer(clearance: Clearance, q: Array, free: Array, room: float, limits: tuple[Array, Array], rng: np.random.Generator) -> Array:
+    """Returns a free configuration nearer to q: joints that need not move are put back, and ways beside the one that is known are tried.
+
+    The way that is known is one of few at random, in which all joints move and most of them for nothing.
+    """
+    lower, upper = limits
+    half = (upper - lower) / 2
+    best = _towards(clearance, q, _put_back(clearance, q, free, room), room)
+    for width in WIDTHS:
+        for aside in width * rng.normal(size=(EACH, len(q))) / np.sqrt(len(q)):
+            way = (best - q) / half
+            length = np.linalg.norm(way)
+            turned = way / length + aside
+            near = np.clip(q + NEARER * length * turned / np.linalg.norm(turned) * half, lower, upper)
+            if np.linalg.norm((near - q) / half) < length and clearance.free(near, room):
+                best = _towards(clearance, q, near, room)
+    return _put_back(clearance, q, best, room)
+
+
+def _put_back(clearance: Clearance, q: Array, free: Array, room: float) -> Array:
+    """Returns the free configuration with each joint back at q, those that have moved least first, where it is free without that."""
+    found = free
+    for joint in np.abs(free - q).argsort():
+        back = np.where(np.arange(len(q)) == joint, q, found)
+        if clearance.free(back, room):
+            found = back
+    return found
 
 
 def _towards(clearance: Clearance, q: Array, free: Array, room: float) -> Array:
