@@ -65,11 +65,13 @@ class Owned:
 
 
 class SolverTimeRow(Owned, Base):
-    """This row counts how long solvers have worked for a project in a calendar month."""
+    """This row counts how long solvers have worked for an API key of a project in a calendar month."""
 
     __tablename__ = "solver_time"
 
     project: Mapped[str] = mapped_column(String(64), ForeignKey("projects.name"), primary_key=True)
+    key_id: Mapped[str] = mapped_column(String(36), primary_key=True, default="")
+    """The key's id, also when it is forgotten; empty for jobs of no key."""
     month: Mapped[str] = mapped_column(String(7), primary_key=True)
     """In UTC, as 2026-11."""
     seconds: Mapped[float]

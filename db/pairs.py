@@ -220,7 +220,7 @@ def save(session: Session, claim: Claim, results: Mapping[tuple[int, int], PairR
         skip(session, job, PairRow.iteration == claim.iteration, PairRow.id > last)
         rest = [pair for pair in rest if pair <= last]
     finished = job.open_pairs == job.running_pairs == 0 and _finish_iteration(session, job, claim.iteration)
-    solver_time.add(session, job.project, sum(result.seconds for result in saved.values()))
+    solver_time.add(session, job.project, sum(result.seconds for result in saved.values()), job.key_id)
     return Saved(bool(rest), finished)
 
 

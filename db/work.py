@@ -3,8 +3,8 @@
 A message to the solvers only says that there is work. Which work it is, this module decides when a solver is free. It goes to the
 project whose work the fewest solvers do now, however many keys and jobs the project has; within it to the key of which the same is
 true; within the key to the job that was served least. So a newcomer gets the next solver that is free, however long pieces of others
-take. Of projects for which as many solvers work, that one goes first for which they worked least lately (db.solver_time). Keys of which as
-many work take turns. While no solver is free, a process beside them does pieces of new jobs.
+take. Of projects for which as many solvers work, that one goes first for which they worked least lately (db.solver_time), and so it is
+with the keys of a project. While no solver is free, a process beside them does pieces of new jobs.
 
 ``jobs.served`` counts the seconds that a job was given, divided by its share. The job with the least goes next (stride scheduling:
 Waldspurger, Weihl 1995). Each step of priority doubles a job's share of its key's work.
@@ -15,8 +15,8 @@ The queries are built once, with the time and the job as parameters, because bui
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Sequence
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
 from datetime import timedelta
 from functools import cache
 
@@ -34,7 +34,7 @@ NEW_SECONDS = 60.0
 """A job counts as new for this long after a solver has first begun a piece of it."""
 ROUNDING = 1e-9
 """Sums of fractions of batches may be too large by so much."""
-Placed = Row[tuple[str, str, str | None, float, int]]
+Placed = Row[tuple[str, str, str | None, int]]
 """A job of :func:`_placed`."""
 
 
@@ -62,14 +62,15 @@ def _in_turn(session: Session, places: int, most: int) -> Sequence[str]:
 
 
 def _sorted(
-    session: Session, found: Sequence[Placed], of_project: Counter[str], of_key: Counter[tuple[str, str | None]]
+    session: Session, found: Sequence[Placed], of_project: defaultdict[str, float], of_key: Counter[tuple[str, str | None]]
 ) -> Sequence[Placed]:
     """Returns jobs in the order of work, from the solvers that each project and each key has."""
-    lately = solver_time.lately(session)
+    key_lately = solver_time.lately(session)
+    lately = _of_projects(key_lately)
 
-    def turn(one: Placed) -> tuple[int, int, float, str, int, float, str]:
+    def turn(one: Placed) -> tuple[int, float, float, str, int, float, str]:
         project, key = one.project, (one.project, one.key_id)
-        return one.place, of_project[project], lately.get(project, 0.0), project, of_key[key], one.served, one.key_id or ""
+        return one.place, of_project[project], lately[project], project, of_key[key], key_lately.get(key, 0.0), one.key_id or ""
 
     return sorted(found, key=turn)
 
@@ -207,20 +208,25 @@ def served_by_now(session: Session) -> float:
     return waiting or 0.0
 
 
-def _held(session: Session) -> tuple[Counter[str], Counter[tuple[str, str | None]]]:
+def _held(session: Session) -> tuple[defaultdict[str, float], Counter[tuple[str, str | None]]]:
     """Returns for how many leases each project, and each key, is worked for."""
     of_key = leases.count_of_keys(session)
-    of_project: Counter[str] = Counter()
+    return _of_projects(of_key), of_key
+
+
+def _of_projects(of_key: Mapping[tuple[str, str | None], float]) -> defaultdict[str, float]:
+    """Returns the sum over the keys of each project."""
+    of_project: defaultdict[str, float] = defaultdict(float)
     for (project, _), count in of_key.items():
         of_project[project] += count
-    return of_project, of_key
+    return of_project
 
 
 _NOW = bindparam("now", type_=Utc())
 
 
 @cache
-def _placed(new: bool = False) -> Select[tuple[str, str, str | None, float, int]]:
+def _placed(new: bool = False) -> Select[tuple[str, str, str | None, int]]:
     """Returns the query for the jobs of each key in the order in which they are served: the one served least, and of several the newest.
 
     So a job that has just started gets its first piece at once, also beside a hundred of the same key.
@@ -233,8 +239,8 @@ def _placed(new: bool = False) -> Select[tuple[str, str, str | None, float, int]
     order = newest if new else (JobRow.served, *newest)
     place = func.row_number().over(partition_by=(JobRow.project, JobRow.key_id), order_by=order).label("place")
     work = and_(_is_new(), _has_work(fresh=True), ~_has_solver()) if new else _has_work()
-    placed = select(JobRow.id, JobRow.project, JobRow.key_id, JobRow.served, place).where(work).subquery()
-    columns = (placed.c.id, placed.c.project, placed.c.key_id, placed.c.served, placed.c.place)
+    placed = select(JobRow.id, JobRow.project, JobRow.key_id, place).where(work).subquery()
+    columns = (placed.c.id, placed.c.project, placed.c.key_id, placed.c.place)
     return select(*columns).where(placed.c.place <= bindparam("places")).order_by(placed.c.place).limit(bindparam("most"))
 
 

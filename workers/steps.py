@@ -60,7 +60,7 @@ def _save(claim: steps.Claim, state: StepState, done: Done, seconds: float) -> b
         if claim.kind == ACCEPT and state == StepState.DONE:
             job.accept_after = utcnow() + timedelta(seconds=REST * seconds)
         done.save(session, job)
-        solver_time.add(session, job.project, seconds)
+        solver_time.add(session, job.project, seconds, job.key_id)
         return True
 
 

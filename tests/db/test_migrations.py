@@ -8,8 +8,8 @@ import pytest
 from sqlalchemy import inspect, select, text
 
 from certifier.errors import CirisError
-from db import clock, jobs, migrate, pairs, regions, scenes, work
-from db.models import IterationRow
+from db import clock, jobs, migrate, pairs, regions, scenes, solver_time, work
+from db.models import DEFAULT_PROJECT, IterationRow, SolverTimeRow
 from db.session import Database
 from tests.db.builders import a_job, a_running_job, add_iteration, add_region, all_pairs
 from tests.scenes import slider
@@ -98,6 +98,20 @@ def test_what_is_held_on_the_way_up_is_held_since_nobody_knows_when(empty_databa
         (after,) = all_pairs(session, job_id)
         assert (after.worker, after.lease_token, after.lease_until) == (before.worker, before.lease_token, before.lease_until)
         assert (after.lease_since, jobs.get(session, job_id).coordinator_since) == (None, None)
+    database.close()
+
+
+def test_the_time_that_a_project_has_used_survives_the_way_down_and_up(empty_database_url: str) -> None:
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    with database.write() as session:
+        solver_time.add(session, DEFAULT_PROJECT, 1.0)
+        for key in ("a", "b"):
+            solver_time.add(session, DEFAULT_PROJECT, 2.0, key)
+    database = there_and_back(database, empty_database_url, "0044")
+    with database.read() as session:
+        assert solver_time.used(session, DEFAULT_PROJECT) == 5.0
+        assert [row.key_id for row in session.scalars(select(SolverTimeRow))] == [""]
     database.close()
 
 

@@ -47,12 +47,20 @@ def test_of_what_solvers_have_done_lately_half_is_forgotten_every_quarter_of_a_m
         assert row.counted_at is not None
         row.counted_at -= timedelta(seconds=3 * solver_time.HALF_LIFE_SECONDS)
     with db.read() as session:
-        assert solver_time.lately(session) == pytest.approx({DEFAULT_PROJECT: 1.0}, rel=0.1)
+        assert solver_time.lately(session) == pytest.approx({(DEFAULT_PROJECT, None): 1.0}, rel=0.1)
     with db.write() as session:
         solver_time.add(session, DEFAULT_PROJECT, 2.0)
         solver_time.add(session, "others", 5.0)
-        assert solver_time.lately(session) == pytest.approx({DEFAULT_PROJECT: 3.0, "others": 5.0}, rel=0.1)
-    assert used(db) == 10.0, "of what counts for the limit nothing is forgotten"
+        solver_time.add(session, DEFAULT_PROJECT, 4.0, "a key")
+        of_keys = {(DEFAULT_PROJECT, None): 3.0, ("others", None): 5.0, (DEFAULT_PROJECT, "a key"): 4.0}
+        assert solver_time.lately(session) == pytest.approx(of_keys, rel=0.1)
+        for row in session.scalars(select(SolverTimeRow).where(SolverTimeRow.key_id == "a key")):
+            assert row.counted_at is not None
+            row.counted_at -= timedelta(seconds=2 * solver_time.FORGOTTEN_SECONDS)
+        session.flush()
+        assert (DEFAULT_PROJECT, "a key") not in solver_time.lately(session)
+        assert solver_time.used_by_all(session) == {DEFAULT_PROJECT: 14.0, "others": 5.0}
+    assert used(db) == 14.0, "of what counts for the limit nothing is forgotten"
 
 
 def test_deleting_jobs_gives_no_time_back(db: Database) -> None:

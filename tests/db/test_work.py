@@ -183,6 +183,18 @@ def test_who_always_has_a_new_small_job_has_no_larger_share(db: Database) -> Non
     assert solvers.seconds[long] == pytest.approx(90, rel=0.1)
 
 
+@pytest.mark.parametrize("solvers", [1, 3])
+def test_a_key_that_always_has_a_new_small_job_has_no_larger_share_within_its_project(db: Database, solvers: int) -> None:
+    """A new job has as little as the job that was served least. So the order is not by jobs."""
+    long = a_job_of(db, "long", pair_count=200)
+    running, small = Solvers(db, solvers, 0.0), list[str]()
+    for end in range(1, 61):
+        small += [a_job_of(db, "also", pair_count=1) for _ in range(solvers)]
+        running.run_until(float(end))
+    assert sum(running.seconds[job_id] for job_id in small) == pytest.approx(30 * solvers, rel=0.1)
+    assert running.seconds[long] == pytest.approx(30 * solvers, rel=0.1)
+
+
 def told(db: Database, processes: int) -> None:
     """A worker reports how many pieces it does at the same time."""
     made = Made("host:1:1", WorkerKind.SOLVE, "1", processes, cores=processes, memory_bytes=1)
