@@ -39,9 +39,17 @@ LONG: dict[str, Any] = {"kind": "grow", "seed": {"q": [0.0, 0.0], "tries": 100},
 """Many seedings in one step, which takes many times as long as all of a small job."""
 
 
+SLOT_SECONDS = 2.0
+"""The process for new jobs, if it has begun a seeding while another process accepted a region, takes the place of that one within this."""
+
+
 def seeding(job_id: str) -> StepRow | None:
     with database().read() as session:
         return session.scalar(select(StepRow).where(StepRow.job_id == job_id, StepRow.kind == "propose", StepRow.state == "running"))
+
+
+def has_region(job_id: str) -> bool:
+    return any(event.kind == "region" for event in events_of(job_id))
 
 
 def lost(job_id: str) -> list[str]:
@@ -56,7 +64,9 @@ def test_a_small_job_ends_before_the_seedings_that_have_all_processes(
     with running_service(sqlite_url, own_queue.url, tmp_path):
         assert ended(submit(planar, box_around(np.zeros(2), 0.1))).outcome == "certified"
         first, second = (submit(planar, LONG) for _ in range(2))
-        eventually(lambda: seeding(first) and seeding(second), "both seed")
+        both = "both seed, and nothing else is to be done for them"
+        eventually(lambda: all(seeding(job) and has_region(job) for job in (first, second)), both)
+        time.sleep(SLOT_SECONDS)
         for kind in ("cancelled", "killed", "given up"):
             third = submit(planar, LONG)
             step = eventually(lambda job=third: seeding(job), "the new job seeds beside them")  # type: ignore[misc]
