@@ -102,11 +102,14 @@ def test_the_robot_begins_at_the_seed_beside_the_scene_file(
 def drop(page: Any, place: Any, path: Path, steps: tuple[str, ...] = ("dragEnter", "dragOver", "drop")) -> None:
     """Drops a file or a folder on the page, as the file manager of a desktop does."""
     box = place.bounding_box()
-    at = {"x": box["x"] + 5, "y": box["y"] + 5}
+    drag(page, box["x"] + 5, box["y"] + 5, path, steps)
+
+
+def drag(page: Any, x: float, y: float, path: Path, steps: tuple[str, ...]) -> None:
     dragged = {"items": [], "files": [str(path)], "dragOperationsMask": 1}
     tools = page.context.new_cdp_session(page)
     for step in steps:
-        tools.send("Input.dispatchDragEvent", {"type": step, **at, "data": dragged})
+        tools.send("Input.dispatchDragEvent", {"type": step, "x": x, "y": y, "data": dragged})
 
 
 @pytest.mark.parametrize("place", ["main h1", ".choose"])
@@ -143,6 +146,16 @@ def test_the_page_marks_what_takes_a_file_that_is_dragged(page: Any, url: str, p
     marked.wait_for()
     drop(page, page.locator(".choose"), ARM)
     marked.wait_for(state="detached")
+
+
+def test_a_file_that_is_dragged_out_of_the_page_leaves_no_mark(page: Any, url: str) -> None:
+    page.goto(f"{url}/new")
+    page.get_by_label("or upload one").wait_for()
+    for _ in range(2):
+        drop(page, page.locator(".choose"), ARM, ("dragEnter", "dragOver"))
+        page.locator(".choose.over").wait_for()
+        drag(page, -5, -5, ARM, ("dragOver",))
+        page.locator(".choose:not(.over)").wait_for()
 
 
 def zipped(directory: Path) -> bytes:
