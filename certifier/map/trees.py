@@ -14,7 +14,7 @@ import numpy as np
 
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Array, Geometry, Pair, Scene, Volume
-from certifier.partition.together import gaps_between, halves, volumes_of
+from certifier.partition.together import gaps_between, halves, placed, volumes_of
 
 ROOM = 0.05
 """Volumes of several geometries are apart for a sample if they are apart by this, in metres."""
@@ -110,7 +110,7 @@ class Plan:
     def _divided(self, first: Geometries, second: Geometries) -> list[tuple[Geometries, Geometries]]:
         """Returns the halves of the geometries that reach farther, each with all of the others."""
         larger, other = sorted((first, second), key=self._reach, reverse=True)
-        return [(half, other) for half in halves(larger)]
+        return [(half, other) for half in halves(Kinematics.of(self._scene), larger)]
 
     def _reach(self, geometries: Geometries) -> float:
         """Returns the diagonal of the box around the vertices of geometries, in metres; -1 for a single one, which has no halves."""
@@ -118,9 +118,8 @@ class Plan:
             return -1.0
         names = tuple(geometry.name for geometry in geometries)
         if names not in self._reaches:
-            body, kinematics, here = geometries[0].body, Kinematics.of(self._scene), np.zeros((1, self._scene.n))
-            placed = [kinematics.points(body, each.body, each.vertices, here)[0] for each in geometries]
-            self._reaches[names] = float(np.linalg.norm(np.ptp(np.concatenate(placed), axis=0)))
+            points = np.concatenate(placed(Kinematics.of(self._scene), geometries, geometries[0].body))
+            self._reaches[names] = float(np.linalg.norm(np.ptp(points, axis=0)))
         return self._reaches[names]
 
     def _gaps(self, first: Geometries, second: Geometries, samples: Array) -> Array | None:

@@ -87,13 +87,18 @@ def _volume(kinematics: Kinematics, geometries: Sequence[Geometry]) -> Volume:
     if len(geometries) == 1:
         return Volume.of(geometries[0])
     radius, names, bodies = geometries[0].radius, tuple(g.name for g in geometries), dict.fromkeys(g.body for g in geometries)
-    here = np.zeros((1, kinematics.scene.n))
-    placed = {body: np.concatenate([kinematics.points(body, g.body, g.vertices, here)[0] for g in geometries]) for body in bodies}
-    if len(placed[geometries[0].body]) <= limits.CORNERS:
-        return Volume(names, geometries[0].body, placed[geometries[0].body], radius if len(bodies) == 1 else radius + MARGIN)
-    body = min(bodies, key=lambda body: float(np.ptp(placed[body], axis=0).prod()))
-    ends = placed[body].min(axis=0) - MARGIN, placed[body].max(axis=0) + MARGIN
+    around = {body: np.concatenate(placed(kinematics, geometries, body)) for body in bodies}
+    if len(around[geometries[0].body]) <= limits.CORNERS:
+        return Volume(names, geometries[0].body, around[geometries[0].body], radius if len(bodies) == 1 else radius + MARGIN)
+    body = min(bodies, key=lambda body: float(np.ptp(around[body], axis=0).prod()))
+    ends = around[body].min(axis=0) - MARGIN, around[body].max(axis=0) + MARGIN
     return Volume(names, body, np.array(list(itertools.product(*zip(*ends, strict=True)))), radius)
+
+
+def placed(kinematics: Kinematics, geometries: Sequence[Geometry], body: str) -> list[Array]:
+    """Returns the vertices of geometries in the frame of a body that they are welded to, (N, 3) each, in metres."""
+    here = np.zeros((1, kinematics.scene.n))
+    return [kinematics.points(body, geometry.body, geometry.vertices, here)[0] for geometry in geometries]
 
 
 def _clusters(scene: Scene) -> list[list[Geometry]]:
@@ -120,12 +125,15 @@ def _joined(
     if same_padding and len(known) == len(asked) and _will_do(scene, first, second, samples, keep):
         return [known]
     larger, other = (first, second) if len(first) >= len(second) else (second, first)
-    return [members for half in halves(larger) for members in _joined(scene, half, other, numbers, samples, keep)]
+    return [members for half in halves(Kinematics.of(scene), larger) for members in _joined(scene, half, other, numbers, samples, keep)]
 
 
-def halves(geometries: list[Geometry]) -> tuple[list[Geometry], list[Geometry]]:
-    """Returns the lower and the upper half of geometries along the axis in which their centres lie farthest apart."""
-    centers = np.array([geometry.vertices.mean(axis=0) for geometry in geometries])
+def halves(kinematics: Kinematics, geometries: list[Geometry]) -> tuple[list[Geometry], list[Geometry]]:
+    """Returns the lower and the upper half of geometries that are welded together, along the axis in which their centres lie farthest apart.
+
+    The axis is one of those of the first one's body.
+    """
+    centers = np.array([vertices.mean(axis=0) for vertices in placed(kinematics, geometries, geometries[0].body)])
     order = np.argsort(centers[:, np.argmax(np.ptp(centers, axis=0))], kind="stable")
     ordered = [geometries[place] for place in order]
     return ordered[: len(ordered) // 2], ordered[len(ordered) // 2 :]

@@ -21,7 +21,7 @@ from certifier.outcome import Outcome
 from certifier.pair.result import Weakness
 from certifier.partition.certification import CellCertification
 from certifier.partition.hulls import gaps, hull
-from certifier.partition.together import LOST, divided, together, volumes_of
+from certifier.partition.together import LOST, divided, halves, together, volumes_of
 from certifier.proof import limits
 from certifier.proof.region import read_part
 from certifier.verify.kinematics import ExactKinematics
@@ -234,6 +234,18 @@ def test_a_hand_of_several_bodies_shares_one_certificate_and_one_box_contains_it
         inside = own.points(around.body, geometry.body, geometry.vertices, s)
         assert (inside > around.vertices.min(axis=0)).all()
         assert (inside < around.vertices.max(axis=0)).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_hand_of_bodies_at_odd_angles_is_divided_where_its_bodies_lie_apart(seed):
+    scene = hand(seed=seed)
+    *bodies, _ = scene.geometries
+    frame, zero = bodies[0].body, np.zeros((1, 2))
+    center = {g.name: Kinematics.of(scene).points(frame, g.body, g.vertices.mean(axis=0)[None], zero)[0, 0] for g in bodies}
+    spread = np.ptp(list(center.values()), axis=0)
+    lower, upper = (np.array([center[g.name] for g in half])[:, spread.argmax()] for half in halves(Kinematics.of(scene), bodies))
+    assert len(lower) == len(upper) == 2
+    assert lower.max() <= upper.min()
 
 
 def test_a_region_of_an_arm_with_a_hand_is_proved_of_each_of_its_bodies():
