@@ -86,7 +86,7 @@ def _cover(args: Namespace, screen: Screen) -> dict[str, Any]:
         if (value := getattr(args, name)) is not None
     }
     ways = args.way or [cover.CIRIS]
-    return cover.cover(args.case, ways, args.processes, args.deadline, args.data, args.verify, screen.line, **more)
+    return cover.cover(args.cases, ways, args.processes, args.deadline, args.data, args.verify, screen.line, **more)
 
 
 _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
@@ -146,7 +146,7 @@ def _parser() -> ArgumentParser:
     kinds.add_parser("agreement", parents=[as_json], help="compare verdicts on hundreds of pairs with Drake's")
     kinds.add_parser("scaling", parents=[against], help="measure how the cost grows with obstacles, joints and faces")
     covered = kinds.add_parser("cover", parents=[as_json], help="measure how much regions cover over the seconds")
-    covered.add_argument("case", choices=list(cover.CASES))
+    covered.add_argument("cases", nargs="+", choices=list(cover.CASES), metavar="CASE", help=", ".join(cover.CASES))
     covered.add_argument(
         "--way", action="append", choices=[*cover.WAYS], help="drake and iris_zo: IRIS regions without certificates; default ciris"
     )

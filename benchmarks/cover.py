@@ -58,44 +58,44 @@ CASES = {
     "ur3e_bin": Case("ur3e_bin", 600, {"coverage": 0.99, "connected": True}),
     "iiwa_shelf": Case("iiwa_shelf", 600, {"connect": list(SHELF.values())}),
     "iiwa_shelf_free": Case("iiwa_shelf", 300, {"coverage": 0.95, "stages": 1}),
+    "iiwa_gripper": Case("iiwa_gripper", 300, {"coverage": 0.95, "stages": 1}),
 }
 
 
 def cover(
-    name: str, ways: list[str], processes: int, deadline_s: float | None, data: Path | None, verify: bool, progress: Progress, **more: Any
+    names: list[str],
+    ways: list[str],
+    processes: int,
+    deadline_s: float | None,
+    data: Path | None,
+    verify: bool,
+    progress: Progress,
+    **more: Any,
 ) -> dict[str, Any]:
-    """Covers a case's example in these ways, and returns the document of ``ciris bench cover``.
+    """Covers the examples of cases in these ways, one after the other. Returns the document of ``ciris bench cover``.
 
     Args:
-        data: directory that keeps the service's data; None for one that is removed.
+        data: directory that keeps the services' data, in one of its own for each case; None for one that is removed.
         verify: whether the service checks the proof of every region once more, after the cover.
-        more: options of the cover besides the case's.
+        more: options of the covers besides the cases'.
 
     Raises:
         CirisError: the service does not start, or refuses the cover.
     """
-    case = CASES[name]
-    options, seconds = {**case.options, **more}, deadline_s or case.deadline_s
-    runs = {}
-    if CIRIS in ways:
-        runs[CIRIS] = _certified(case, options, processes, seconds, data, verify, progress)
-    scene = catalogue.scene(case.example)
-    if MAP in ways:
-        runs[MAP] = _mapped(scene, options, processes, seconds, progress)
-    for way, method in ((DRAKE, Method.IRIS), (ZO, Method.IRIS_ZO)):
-        if way in ways:
-            told = partial(_tell, progress, way)
-            runs[way] = iris_cover.cover(scene, options, processes, seconds, told, method)
-    return {
-        "benchmark": "cover",
-        "machine": measure.machine(),
-        "case": name,
-        "scene": case.example,
-        "options": options,
-        "deadline_seconds": seconds,
-        "processes": processes,
-        "runs": runs,
-    }
+    rows = []
+    for name in names:
+        case = CASES[name]
+        options, seconds, scene = {**case.options, **more}, deadline_s or case.deadline_s, catalogue.scene(case.example)
+        runs = {}
+        if CIRIS in ways:
+            runs[CIRIS] = _certified(case, options, processes, seconds, data and data / name, verify, progress)
+        if MAP in ways:
+            runs[MAP] = _mapped(scene, options, processes, seconds, progress)
+        for way, method in ((DRAKE, Method.IRIS), (ZO, Method.IRIS_ZO)):
+            if way in ways:
+                runs[way] = iris_cover.cover(scene, options, processes, seconds, partial(_tell, progress, way), method)
+        rows.append({"case": name, "scene": case.example, "options": options, "deadline_seconds": seconds, "runs": runs})
+    return {"benchmark": "cover", "machine": measure.machine(), "processes": processes, "rows": rows}
 
 
 def _tell(progress: Progress, way: str, point: dict[str, Any]) -> None:
@@ -116,9 +116,12 @@ def _mapped(scene: Scene, options: dict[str, Any], processes: int, seconds: floa
 
 
 def picture(document: dict[str, Any]) -> str:
-    """Draws the coverage of all ways over the seconds as SVG."""
-    series = {WAYS[way]: [(point["seconds"], point["coverage"]) for point in run["points"]] for way, run in document["runs"].items()}
-    return draw([Panel(document["scene"], series)], "share of the free configurations, over seconds", share=True)
+    """Draws the coverage of all ways over the seconds as SVG, one panel for each case."""
+    panels = []
+    for row in document["rows"]:
+        series = {WAYS[way]: [(point["seconds"], point["coverage"]) for point in run["points"]] for way, run in row["runs"].items()}
+        panels.append(Panel(row["scene"], series))
+    return draw(panels, "share of the free configurations, over seconds", share=True)
 
 
 @contextmanager

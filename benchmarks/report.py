@@ -345,10 +345,14 @@ def _plan(document: Document) -> list[str]:
 
 
 def _cover(document: Document) -> list[str]:
-    """Returns a short table of the coverage over the seconds, and sentences about the regions at the end."""
+    """Returns for each case a short table of the coverage over the seconds, and sentences about the regions at the end."""
+    return [part for row in document["rows"] for part in _covered(row, document["processes"])]
+
+
+def _covered(row: dict[str, Any], processes: int) -> list[str]:
     header = ["way", "seconds", "covered %", "regions", "components", "% of it in the largest", "component of each to connect"]
     rows, said = [], []
-    for way, run in document["runs"].items():
+    for way, run in row["runs"].items():
         shown = cover.table(way, run)
         rows += [*shown[:: max(len(shown) // COVER_ROWS, 1)][:-1], *shown[-1:]]
         extra = "" if "proofs_hold" not in run else f" The verifier has accepted the proofs of {run['proofs_hold']} regions once more."
@@ -359,7 +363,7 @@ def _cover(document: Document) -> list[str]:
         if run.get("colliding"):
             mean, largest = (100 * run["colliding"][which] for which in ("mean", "largest"))
             said.append(f"In its regions {mean:.2g} % of the samples collide, in one of them {largest:.2g} %.")
-    title = f"{document['case']}, {document['processes']} processes, until {document['deadline_seconds']:g} s."
+    title = f"{row['case']}, {processes} processes, until {row['deadline_seconds']:g} s."
     return [title, _table(header, rows), *said]
 
 
