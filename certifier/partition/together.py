@@ -129,7 +129,7 @@ def _joined(
 
 
 def halves(kinematics: Kinematics, geometries: list[Geometry]) -> tuple[list[Geometry], list[Geometry]]:
-    """Returns the lower and the upper half of geometries that are welded together, along the axis in which their centres lie farthest apart.
+    """Returns the lower and the upper half of geometries welded together, along the axis in which their centres lie farthest apart.
 
     The axis is one of those of the first one's body.
     """
