@@ -47,6 +47,7 @@ def checked(db: Database, body: JobRequest, where: str = "") -> Checked:
         with db.read() as session:
             scene_id = scenes.find(session, body.scene)
         scene = scenes.load(db, scene_id)
+        scene.check_pairs()
         body = with_positions(db, scene, body)
         options = KINDS[body.kind].options(body, scene, db)
         if body.webhook is not None:

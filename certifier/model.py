@@ -35,6 +35,7 @@ _STORED = "the document was changed or is of another version; load the scene fro
 DESCRIPTIVE = frozenset({"name", "hash", "warnings", "provenance", "configurations"})
 """Fields of a scene's document on which no proof depends."""
 WORLD = "world"
+NO_PAIRS = "no pair of bodies can collide in this scene"
 
 
 class JointKind(StrEnum):
@@ -280,6 +281,21 @@ class Scene(ConfigurationSpace):
             return self._geometry[name]
         except KeyError:
             raise SceneError("unknown_geometry", f"no geometry is called {name!r}", hint="write model/body/geometry") from None
+
+    def check_pairs(self, field: str = "scene") -> None:
+        """Refuses the scene if it has no pairs: what would be proved about it would be about nothing. Conditions have pairs, too.
+
+        Args:
+            field: where the user has named it.
+
+        Raises:
+            SceneError: ``no_pairs``.
+        """
+        if not self.pairs:
+            hint = (
+                "give the robot's links collision geometry (<collision> in a URDF), add what they may hit, or ignore fewer pairs"
+            )
+            raise SceneError("no_pairs", f"{NO_PAIRS}, so there is nothing to prove", field=field, hint=hint)
 
     @cached_property
     def _pairs_of(self) -> dict[str, list[tuple[int, Pair]]]:

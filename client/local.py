@@ -28,15 +28,17 @@ if TYPE_CHECKING:
 
 
 def load(scene: str) -> Scene:
-    """Returns the scene of a scene file.
+    """Returns the scene of a scene file, about which something is to be proved.
 
     Raises:
-        SceneError: scene_not_found for a name that only a service could know, or what is wrong with the file.
+        SceneError: scene_not_found for a name that only a service could know, no_pairs, or what is wrong with the file.
     """
     check_is_file(scene)
     from certifier.scene import load_scene
 
-    return load_scene(scene)
+    loaded = load_scene(scene)
+    loaded.check_pairs()
+    return loaded
 
 
 def positions_of(scene: Scene, given: Given, field: str) -> list[float]:

@@ -164,6 +164,12 @@ def _position(value: float) -> str:
     return f"{round(value, 9) + 0.0:.4g}"
 
 
+def _certified(pairs: Sequence[Mapping[str, Any]], ignored: int) -> str:
+    """Returns how many pairs are certified. Earlier versions certified regions of scenes without any."""
+    done = sum(pair["outcome"] == "certified" for pair in pairs)
+    return f"{done} of {len(pairs)} certified, {ignored} ignored" if pairs else "no pair of bodies can collide in this scene"
+
+
 def print_region(manifest: dict[str, Any], extra: Iterable[tuple[str, str]] = ()) -> None:
     """Prints a region's manifest in a few lines."""
     pairs, space = manifest["pairs"], manifest["space"]
@@ -180,7 +186,7 @@ def print_region(manifest: dict[str, Any], extra: Iterable[tuple[str, str]] = ()
             ("faces", f"{faces}, {limits} of them joint limits" if faces > limits else str(faces)),
             ("volume", q_volume(manifest.get("q_volume"))),
             *([("share", f"{share(kept)} of the proposal's collision-free part")] if kept else []),
-            ("pairs", f"{sum(p['outcome'] == 'certified' for p in pairs)} of {len(pairs)} certified, {len(manifest['ignored'])} ignored"),
+            ("pairs", _certified(pairs, len(manifest["ignored"]))),
             *([("", manifest["not_covered"]["summary"])] if "not_covered" in manifest else []),
             *(("condition", f"{one['name']}: {one['statement']}") for one in manifest.get("conditions", ())),
             *([("proved distance", f"at least {distance(least['margin'])}: {least['a']} - {least['b']}")] if least else []),

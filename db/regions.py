@@ -92,7 +92,7 @@ def page(
 
 def count(session: Session, **filters: Unpack[Filters]) -> int:
     """Returns how many regions match the filters."""
-    return session.scalar(_matching(**filters).with_only_columns(func.count())) or 0
+    return session.scalar(_matching(**filters).with_only_columns(func.count(RegionRow.id))) or 0
 
 
 def _matching(**filters: Unpack[Filters]) -> Select[RegionRow]:

@@ -15,7 +15,6 @@ import numpy as np
 from scipy.optimize import minimize
 
 from certifier.conditioned import without_conditions
-from certifier.errors import RegionError
 from certifier.growth.pairs import alike
 from certifier.jobs.parallel import side_by_side
 from certifier.kinematics import Kinematics
@@ -100,12 +99,11 @@ def clearance(data: bytes, processes: int = 1, seed: int = 0) -> RegionClearance
 
     Raises:
         ProofError: the file is no region's proof, or one that does not hold.
-        RegionError: ``no_pairs``.
+        SceneError: ``no_pairs``.
     """
     proof, known = RegionProof.from_bytes(data), verify_region(data, processes).gap
     scene, polytope = without_conditions(proof.scene), Polytope(proof.C, proof.d)  # They are no distances between bodies.
-    if not scene.pairs:
-        raise RegionError("no_pairs", "the scene has no pair of bodies", field="PROOF", hint="add what the robot can collide with")
+    scene.check_pairs("PROOF")
     distances = _Distances(scene)
     nearest, file, share = _sampled(distances, polytope, proof.interior, seed), None, 1.0
     for _ in range(TRIES):

@@ -45,6 +45,7 @@ def given(scene: Scene, waypoints: Any, coordinates: Space, space: Space | None 
 
     Raises:
         RegionError: ``motion_shape``, ``motion_not_finite``, ``motion_too_long``, or ``outside_limits`` with the waypoint and the joint.
+        SceneError: ``no_pairs``.
     """
     points = _numbers(scene, waypoints, field)
     space = space or coordinates
@@ -101,9 +102,7 @@ def _numbers(scene: Scene, waypoints: Any, field: str) -> Array:
 
 def _check_scene(scene: Scene, waypoints: int, field: str) -> None:
     """Checks that the scene has pairs, and that a proof of them has room for this many waypoints, or for ``waypoints - 1`` pieces."""
-    if not scene.pairs:
-        hint = "add what moves against something else"
-        raise RegionError("motion_shape", "the scene has no pair of bodies to keep apart", field="scene", hint=hint)
+    scene.check_pairs()
     if waypoints * len(scene.pairs) > limits.INTERVALS:
         most = limits.INTERVALS // len(scene.pairs)
         problem = f"there are {waypoints} waypoints, and a proof about this scene holds at most {most}"

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from certifier.kinematics import Kinematics
-from certifier.model import Array, Geometry, Pair, Scene
+from certifier.model import NO_PAIRS, Array, Geometry, Pair, Scene
 from certifier.scene.contacts import touching
 from certifier.scene.hollow import beyond, remedy, standing_for
 from certifier.scene.tree import Tree
@@ -47,7 +47,7 @@ def findings(
         *units(scene, tree),
         *_always_touching(scene),
         *(_ignored(scene, files or {}) if scene.ignored else []),
-        *([] if scene.pairs else ["no pair of geometries can collide: there is nothing to certify"]),
+        *([] if scene.pairs else [f"{NO_PAIRS}: there is nothing to prove"]),
     ]
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from certifier.errors import ProofError
-from certifier.model import Scene
+from certifier.model import NO_PAIRS, Scene
 from certifier.proof.map import MapProof
 from certifier.proof.partition import PLANE
 from certifier.verify.conditions import conditions
@@ -43,6 +43,8 @@ class MapStatement:
         free = (
             f"{self.missing} of {pairs} pairs have no cells: no configuration is proved to be free"
             if self.missing
+            else NO_PAIRS
+            if not scene.body_pairs
             else f"{len(scene.body_pairs)} pairs of bodies; a configuration is free of collision if it is in a cell of each of them"
         )
         return [

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from certifier.errors import ProofError
-from certifier.model import Pair, Scene
+from certifier.model import NO_PAIRS, Pair, Scene
 from certifier.proof import limits
 from certifier.proof.ground import Ground
 from certifier.proof.region import RegionProof
@@ -66,7 +66,7 @@ class RegionStatement:
             *joints,
             *following(scene),
             f"a bounded, non-empty polytope of {self.faces} half-spaces in tangent space; |s|^2 <= {rounded_up(self.N, 6)}",
-            f"{len(gaps)} pairs of bodies separated at every configuration of it",
+            f"{len(gaps)} pairs of bodies separated at every configuration of it" if gaps else NO_PAIRS,
             *conditions(scene),
             *paddings(scene),
             *([f"least distance, padded, at least {rounded_down(self.gap)} m: '{closest.a}' and '{closest.b}'"] if closest else []),

@@ -363,6 +363,30 @@ def test_a_region_that_was_stored_before_there_were_shares_is_shown(certified: R
     assert not any("share" in line for line in lines)
 
 
+def test_a_region_of_a_scene_without_pairs_that_was_stored_before_is_not_called_certified(
+    certified: Region, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output.print_region({**certified.manifest, "pairs": []})
+    said = capsys.readouterr().out
+    assert "no pair of bodies can collide in this scene" in said
+    assert "certified" not in said
+
+
+@pytest.mark.parametrize("command", [("grow", "--q", "0"), ("map",), ("certify-path", "--q", "0", "--q", "0.1")], ids=lambda c: c[0])
+def test_nothing_is_proved_here_about_a_scene_without_pairs(ciris: Ciris, tmp_path: Path, command: tuple[str, ...]) -> None:
+    (tmp_path / "rail.urdf").write_text(
+        '<robot name="rail"><link name="base"/><link name="tip"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
+        '<joint name="slide" type="prismatic"><parent link="base"/><child link="tip"/><limit lower="-1" upper="1" effort="1" velocity="1"/>'
+        "</joint></robot>"
+    )
+    directives = "directives:\n  - add_model: {name: rail, file: rail.urdf}\n  - add_weld: {parent: world, child: rail::base}\n"
+    (tmp_path / "scene.yaml").write_text(f"name: rail\n{directives}q_star: [0.0]\n")
+    name, *given = command
+    done = ciris(name, "scene.yaml", *given, "--local")
+    assert done.status == 2
+    assert done.error.startswith("scene: no pair of bodies can collide in this scene, so there is nothing to prove (give the robot's links")
+
+
 def test_contains_answers_by_its_exit_status(ciris: Ciris, url: str, region: str) -> None:
     inside = ciris("contains", "slider", "--q", "-0.2", CIRIS_URL=url)
     assert (inside.status, inside.stdout.startswith(f"inside: -0.2 in {region} (margin 0.1, exact)")) == (0, True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,13 @@ import pytest
 from fastapi.testclient import TestClient
 
 from certifier.model import Scene
-from db import events, jobs, pairs, steps
+from db import events, jobs, pairs, scenes, steps
+from db.models import RegionRow
 from db.session import Database
 from db.states import IterationState
 from tests.certifier.scene.test_xacro import confining
 from tests.dashboard.job_scenes import SLIDE, add_iteration
+from tests.scenes import slider
 
 __all__ = ["confining"]
 
@@ -129,9 +132,9 @@ def test_what_to_know_of_a_robot_is_read_where_it_is_uploaded(
 
 
 def test_a_robot_that_cannot_collide_is_said_to_leave_nothing_to_prove(
-    page: Any, url: str, client: TestClient, tmp_path: Path, barriers: Any
+    page: Any, url: str, client: TestClient, tmp_path: Path, barriers: Any, complaints: list[str]
 ) -> None:
-    """Its second link has geometry for looks alone. All proofs about it would be about nothing."""
+    """Its second link has geometry for looks alone. All proofs about it would be about nothing, so no job is started."""
     looks = (
         urdf("arm")
         .replace('<link name="tip"><collision>', '<link name="tip"><visual>')
@@ -142,12 +145,34 @@ def test_a_robot_that_cannot_collide_is_said_to_leave_nothing_to_prove(
     )
     upload(page, url, tmp_path / "arm.urdf")
     page.get_by_text("arm is stored, with 2 joints and 0 pairs").wait_for()
-    page.get_by_text("Nothing in this scene can collide, so there is nothing to prove").wait_for()
+    page.get_by_text("No pair of bodies can collide in this scene, so there is nothing to prove").wait_for()
     assert barriers(page) == []
-    job = client.post("/v1/jobs", json={"kind": "grow", "scene": "arm", "seed": {"q": [0.0, 0.0]}}).json()["id"]
-    page.goto(f"{url}/jobs/{job}")
-    page.get_by_text("Nothing in this scene can collide: it has no two bodies that move against each other.").wait_for()
-    assert page.get_by_text("is covered").count() == 0
+    page.get_by_role("button", name="Start the job").click()
+    page.get_by_text("no pair of bodies can collide in this scene, so there is nothing to prove (give the robot's links").wait_for()
+    assert "422" in complaints.pop()
+    certified: dict[str, Any] = {"polytope": {"C": [[1.0, 0.0]], "d": [0.1]}}
+    kinds: dict[str, dict[str, Any]] = {"grow": {"seed": {"q": [0.0, 0.0]}}, "cover": {}, "map": {}, "certify": certified}
+    for kind, given in {**kinds, "certify-path": {"q": [[0.0, 0.0], [0.1, 0.0]]}}.items():
+        refused = client.post("/v1/jobs", json={"kind": kind, "scene": "arm", **given})
+        assert (refused.status_code, refused.json()["code"], refused.json()["field"]) == (422, "no_pairs", "scene"), kind
+    assert client.get("/v1/jobs").json()["jobs"] == []
+
+
+def test_what_versions_before_certified_of_a_scene_without_pairs_is_not_called_proved(
+    client: TestClient, database: Database, region: str
+) -> None:
+    with database.write() as session:
+        row = session.get_one(RegionRow, region)
+        bare = scenes.add(session, replace(slider(), pairs=()))
+        job, _ = jobs.create(session, kind="grow", scene_id=bare.id, options={"seed": {"q": [0.0]}})
+        row.job_id, row.scene_id, row.manifest = job.id, bare.id, {**row.manifest, "pairs": []}
+    claim = client.get(f"/regions/{region}").text.partition('<section class="claim nothing"')[2].partition("</section>")[0]
+    assert "No pair of bodies can collide in this scene, so nothing is proved about it." in claim
+    assert "Proved:" not in claim
+    assert "Pairs covered" not in claim
+    text = client.get(f"/jobs/{job.id}").text
+    assert "No pair of bodies can collide in this scene: it has no two bodies that move against each other." in text
+    assert "is covered" not in text
 
 
 @pytest.mark.usefixtures("confining")

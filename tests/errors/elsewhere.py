@@ -13,6 +13,7 @@ TESTED = {
     "api/routers/results.py:_map_job": "tests/workers/test_maps.py",
     "api/routers/results.py:_stored_map": "tests/workers/test_maps.py",
     "api/routers/results.py:download_free_set": "tests/workers/test_maps.py",
+    "api/streams.py:_listening": "tests/api/test_events.py",
     "api/writing.py:change": "tests/api/test_writers.py",
     "certifier/conditioned.py:_check_size": "tests/certifier/verify/test_condition_forgeries.py",
     "certifier/conditioned.py:_wrong": "tests/certifier/test_conditioned.py",
@@ -99,7 +100,6 @@ TESTED = {
 
 UNTESTED = {
     "api/questions.py:ask": "many large questions at the same time",
-    "certifier/jobs/clearance.py:clearance": "a region of a scene without pairs",
     "certifier/polytopes/ellipsoid.py:inscribed_ellipsoid": "a polytope whose linear algebra breaks down",
     "certifier/polytopes/polytope.py:_maximise": "a polytope whose linear algebra breaks down",
     "certifier/scene/drake_model.py:build_diagram": "a scene document that was made by hand",

@@ -50,7 +50,7 @@ MOTIONS: Table = {
         lambda t: given(slider(), [[0.0, 0.0]] * 2, Space.Q),
         lambda t: given(slider(), [[0.0], ["x"]], Space.Q),
     ],
-    ("motion_shape", "scene"): [lambda t: given(replace(slider(), pairs=()), [[0.0], [0.1]], Space.Q)],
+    ("no_pairs", "scene"): [lambda t: given(replace(slider(), pairs=()), [[0.0], [0.1]], Space.Q)],
     ("motion_too_long", "waypoints"): [lambda t: given(slider(), [[0.0]] * (1 << 21), Space.Q)],
     ("outside_limits", "waypoints[1][0]"): [lambda t: given(slider(), [[0.0], [99.0]], Space.Q)],
     ("padding", "padding"): [lambda t: padding_of(-1.0)],

@@ -229,13 +229,6 @@ def test_bodies_that_always_touch_leave_an_empty_map(client: TestClient) -> None
     assert verify_file(proof_of(client, job.id)).kind == "map"
 
 
-def test_a_scene_without_pairs_is_proved_at_once(client: TestClient, planar: Scene) -> None:
-    job = ended(asked(client, replace(planar, pairs=()), options={"at": [HIT]}))
-    assert (job.state, job.outcome) == ("succeeded", "certified")
-    told = found(client, job.id)
-    assert (told["ended"], told["coverage"], told["stored"]["at"][0]["state"]) == ("coverage", None, "proved")
-
-
 def test_a_map_without_a_free_set_has_none_to_give(client: TestClient, planar: Scene) -> None:
     job = ended(asked(client, replace(planar, padding=planar.padding + 2e-6), options={"coverage": 0.5}))
     with database().write() as session:  # as where a pair had no cell at the deadline

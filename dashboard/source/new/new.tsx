@@ -192,7 +192,7 @@ function Start({ given, model, parts, first }: Props & { given: string; model: S
       </div>
       <form onSubmit={(event) => void submit(event)}>
         <Wishes wish={wish} parts={parts[wish.kind]} refused={refused} onWish={change} marks={wish.marks.map((mark) => asText(mark, model.units))} here={isMarked(wish, q)} onMark={() => change({ ...wish, marks: [...wish.marks, q] })} onGo={(mark) => setQ(wish.marks[mark]!)} />
-        {model.pairs.length === 0 && <p class="notice bad">Nothing in this scene can collide, so there is nothing to prove: no two of its bodies move against each other. Has the model collision geometry (<code>&lt;collision&gt;</code>)? What is only for looks (<code>&lt;visual&gt;</code>) does not count.</p>}
+        {model.pairs.length === 0 && <p class="notice bad">No pair of bodies can collide in this scene, so there is nothing to prove: no two of its bodies move against each other. Has the model collision geometry (<code>&lt;collision&gt;</code>)? What is only for looks (<code>&lt;visual&gt;</code>) does not count.</p>}
         <div role="alert">
           {between && <p class="notice bad">{between} <button type="button" class="plain" onClick={() => change({ ...wish, kind: "cover", goal: "connect", marks: held })}>Connect them with several regions</button></p>}
           {problem && <p class="notice bad">{problem}</p>}
