@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections import Counter
 from collections.abc import AsyncIterator, MutableMapping
 from contextlib import asynccontextmanager
 from functools import cache, partial
@@ -91,6 +92,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.requests = Requests(settings().requests_file)
     app.state.probes = Probes(app.state.database)
     app.state.children = ChildLimiter()
+    app.state.streams = Counter[str]()
     app.state.libraries = Libraries()
     app.state.links = LinksKept()
     app.state.motions = MotionsKept()

@@ -48,6 +48,8 @@ ALSO: dict[str, tuple[str, ...]] = {
     "cancel_jobs": ("job_not_found", "ambiguous_id", "busy"),
     "delete_job": ("has_dependents", "not_ended", "busy"),
     "cancel_job": ("busy",),
+    "stream_job_events": ("busy",),
+    "stream_project_events": ("busy",),
     "retry_job": ("job_not_retryable", "quota_exceeded", "storage_quota", "time_quota", "busy"),
     "get_job_cover": ("cover_not_found",),
     "get_job_map": ("map_not_found",),

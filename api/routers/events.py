@@ -14,6 +14,7 @@ from api.access import READ, Db, presented
 from api.reading import ReadingRoute
 from api.schemas.common import MAX_INT, JobGiven, Listed
 from api.schemas.jobs import Event, EventList, ProjectEvent, ProjectEventList
+from api.streams import Stream
 from db import event_ids, events, jobs
 from db.event_ids import MOST, EventIds
 from db.models import JobRow
@@ -21,7 +22,6 @@ from db.session import Database
 
 After = Annotated[int, Query(ge=0, le=MAX_INT, description="Return only events with a larger number than this.")]
 AfterEvent = Annotated[int, Query(ge=0, le=MOST, description="Return only events after the one with this `id`; 0: all of them.")]
-POLL_SECONDS = 0.3
 PAGE = 500
 LATE = 200
 """An event whose id is smaller by up to this may still come: workers commit in another order than that of the ids."""
@@ -57,6 +57,7 @@ def _existing(job_id: JobGiven, db: Db) -> JobRow:
 async def stream_job_events(
     job: Annotated[JobRow, Depends(_existing)],
     db: Db,
+    stream: Stream,
     request: Request,
     after: After = 0,
     last_event_id: Annotated[
@@ -79,7 +80,7 @@ async def stream_job_events(
         if ended and len(page) < PAGE:
             yield ServerSentEvent(data={"job": job.id}, event="end")
             return
-        await asyncio.sleep(0 if page else POLL_SECONDS)
+        await asyncio.sleep(0 if page else stream.pause)
 
 
 def _next_page(db: Database, job_id: str, seq: int) -> tuple[list[Event], bool]:
@@ -109,6 +110,7 @@ def list_project_events(
 @project.get("/stream", response_class=EventSourceResponse)
 async def stream_project_events(
     db: Db,
+    stream: Stream,
     request: Request,
     after: Annotated[
         int | None,
@@ -135,7 +137,7 @@ async def stream_project_events(
         seen.update(id for id, _ in page)
         newest = max([newest, *(id for id, _ in page)])
         seen = {one for one in seen if one > newest - LATE}
-        await asyncio.sleep(0 if len(page) == PAGE else POLL_SECONDS)
+        await asyncio.sleep(0 if len(page) == PAGE else stream.pause)
 
 
 def _of_all(db: Database, ids: EventIds, after: int, seen: set[int]) -> list[tuple[int, ProjectEvent]]:

@@ -344,7 +344,7 @@ class AsyncClient:
                     after = event["seq"]
                     yield event
             except CirisError as error:
-                if error.code not in ("unreachable", "timeout"):
+                if error.code not in ("unreachable", "timeout", "busy"):
                     raise
             await asyncio.sleep(PAUSE_S)
             await self.job_after_all(job_id)

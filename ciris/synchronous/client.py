@@ -343,7 +343,7 @@ class Client:
                     after = event["seq"]
                     yield event
             except CirisError as error:
-                if error.code not in ("unreachable", "timeout"):
+                if error.code not in ("unreachable", "timeout", "busy"):
                     raise
             time.sleep(PAUSE_S)
             self.job_after_all(job_id)

@@ -2,16 +2,20 @@
 
 import json
 import time
+from collections import Counter
 from collections.abc import Iterator
+from contextlib import ExitStack
 
 import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
+from api import streams
 from certifier.model import Scene
 from db import events, jobs
 from db.session import Database
 from db.states import JobState
+from tests.workers.service import eventually
 
 
 @pytest.fixture
@@ -92,6 +96,36 @@ def test_a_stream_that_is_to_go_on_beyond_the_last_event_tells_the_next_one(url:
             assert time.monotonic() - began < 10, "only signs of life come"
             if line.startswith("data: ") and json.loads(line.removeprefix("data: "))["seq"] == 2:
                 break
+
+
+def test_a_project_has_a_limited_number_of_streams_which_look_by_turns(
+    monkeypatch: pytest.MonkeyPatch, url: str, database: Database, job_id: str
+) -> None:
+    monkeypatch.setattr(streams, "OF_PROJECT", 2)
+    with httpx2.Client(base_url=url, timeout=60) as client, ExitStack() as open_streams:
+        listened = []
+        for path in ("/v1/events/stream?after=0", f"/v1/jobs/{job_id}/events/stream"):
+            lines = open_streams.enter_context(client.stream("GET", path)).iter_lines()
+            assert read(lines)["event"] == "job"
+            listened.append(lines)  # the stream is closed with it
+        for path in ("/v1/events/stream", f"/v1/jobs/{job_id}/events/stream"):
+            with client.stream("GET", path) as refused:
+                assert refused.status_code == 503
+                assert json.loads(refused.read())["code"] == "busy"
+        assert client.get(f"/v1/jobs/{job_id}/events").status_code == 200
+        open_streams.close()
+        eventually(lambda: read_first(client, "/v1/events/stream?after=0") == "job", "a stream that was closed is not counted any more")
+
+
+def test_streams_look_less_often_where_a_project_has_many() -> None:
+    assert streams.Listening(Counter({"many": 100, "few": 3}), "few").pause == streams.POLL_SECONDS
+    assert streams.Listening(Counter({"many": 100, "few": 3}), "many").pause == 100 / streams.LOOKS_PER_SECOND
+
+
+def read_first(client: httpx2.Client, path: str) -> str | None:
+    """The kind of the first event of a stream; None where it is refused."""
+    with client.stream("GET", path) as response:
+        return read(response.iter_lines())["event"] if response.status_code == 200 else None
 
 
 def test_an_open_stream_does_not_keep_the_server_from_stopping(database: Database, job_id: str, url: str) -> None:

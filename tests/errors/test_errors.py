@@ -44,6 +44,7 @@ ABOUT_ALL = {
     "api/problems.py",
     "api/questions.py",
     "api/room.py",
+    "api/streams.py",
     "api/writing.py",
     "certifier/jobs/parallel.py",
     "client/bench.py",
