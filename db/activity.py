@@ -5,16 +5,18 @@ A job's state alone does not say whether anybody works on it: a job goes on ``ru
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from datetime import datetime
 
-from sqlalchemy import func, select
+from sqlalchemy import case, func, select
 from sqlalchemy.orm import Session
 
 from db import clock, jobs, work, workers
 from db.models import JobRow, PairRow, StepRow
 from db.session import all_projects
 from db.states import JOB, STEP, JobState, PairState, StepState, WorkerState, unfinished
+from db.types import utcnow
 from db.workers import WorkerKind
 
 WORKING = "working"
@@ -26,17 +28,34 @@ MOST_AHEAD = 1000
 """Where more jobs than this come first, their number is not told."""
 
 
-def of_jobs(session: Session, rows: Sequence[JobRow]) -> dict[str, str]:
+@dataclass
+class Kept:
+    """What the database has said about all jobs and workers. Who asks often, keeps it for a moment.
+
+    Attributes:
+        workers: what :func:`db.workers.counts` returns.
+        ahead: the first jobs that wait for a worker of a kind.
+    """
+
+    workers: dict[tuple[str, str], int] | None = None
+    queue_silent: bool = False
+    ahead: dict[WorkerKind, list[str]] = field(default_factory=dict)
+
+
+def of_jobs(session: Session, rows: Sequence[JobRow], kept: Kept | None = None) -> dict[str, str]:
     """Returns what these jobs do, by id: the state of a job that has ended or is being cancelled, ``WORKING``, ``STALLED``, or ``queued:``
     with the reason."""
+    kept = kept or Kept()
     found = {row.id: row.state for row in rows}
     alive = [row for row in rows if row.state in (JobState.QUEUED, JobState.RUNNING)]
     if not alive:
         return found
     children = session.scalars(select(JobRow).where(JobRow.parent_id.in_(_ids(alive)), JobRow.state.in_(unfinished(JOB)))).all()
-    below = of_jobs(session, children)
-    now, held, waiting = clock.now(session), _held(session, alive), _waiting_steps(session, alive)
-    queues = _Queues(session)
+    below = of_jobs(session, children, kept) if children else {}
+    held, waiting = _held(session, alive)
+    nobody = not held and all(row.coordinator is None for row in alive)
+    now = utcnow() if nobody else clock.now(session)  # which asks PostgreSQL
+    queues = _Queues(session, kept)
     for row in alive:
         grown = [below[child.id] for child in children if child.parent_id == row.id]
         if jobs.is_coordinated(row, now) or held.get(row.id, now) > now or WORKING in grown:
@@ -55,13 +74,11 @@ def of_jobs(session: Session, rows: Sequence[JobRow]) -> dict[str, str]:
 
 
 class _Queues:
-    """Says why a job waits. What it asks the database about all jobs, it asks once."""
+    """Says why a job waits. What it asks the database about all jobs, it asks once, and only what is not kept."""
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
-        self._workers: dict[tuple[str, str], int] | None = None
-        self._queue_silent = False
-        self._ahead: dict[WorkerKind, list[str]] = {}
+    def __init__(self, session: Session, kept: Kept) -> None:
+        self._session, self._kept = session, kept
+        self._asked = set[WorkerKind]()
 
     def of_work(self, job_id: str) -> str:
         """Returns why the job has work that no solve worker does."""
@@ -80,11 +97,12 @@ class _Queues:
     def _why(self, kind: WorkerKind, job_id: str) -> str:
         if (missing := self._missing(kind)) is not None:
             return f"{QUEUED}: {missing}"
-        if kind not in self._ahead:
+        ahead = self._kept.ahead.get(kind, [])
+        if job_id not in ahead and kind not in self._asked:  # it may have begun to wait since
             order = work.in_order if kind == WorkerKind.SOLVE else jobs.undecided
             with all_projects(self._session):
-                self._ahead[kind] = list(order(self._session, MOST_AHEAD + 1))
-        ahead = self._ahead[kind]
+                ahead = self._kept.ahead[kind] = list(order(self._session, MOST_AHEAD + 1))
+            self._asked.add(kind)
         if job_id not in ahead:
             return f"{QUEUED}: behind more than {MOST_AHEAD} others" if len(ahead) > MOST_AHEAD else f"{QUEUED}: next"
         number = ahead.index(job_id)
@@ -92,10 +110,10 @@ class _Queues:
 
     def _missing(self, kind: WorkerKind) -> str | None:
         """Returns which worker is missing, or that none hears of work; None where one of this kind takes work."""
-        if self._workers is None:
-            self._workers = workers.counts(self._session)
-            self._queue_silent = workers.miss_queue(self._session)
-        return missing(self._workers, kind) or ("the queue does not answer" if self._queue_silent else None)
+        if self._kept.workers is None:
+            self._kept.queue_silent = workers.miss_queue(self._session)
+            self._kept.workers = workers.counts(self._session)
+        return missing(self._kept.workers, kind) or ("the queue does not answer" if self._kept.queue_silent else None)
 
 
 def missing(counts: dict[tuple[str, str], int], kind: WorkerKind) -> str | None:
@@ -118,22 +136,16 @@ def _ids(rows: Sequence[JobRow]) -> list[str]:
     return [row.id for row in rows]
 
 
-def _held(session: Session, rows: Sequence[JobRow]) -> dict[str, datetime]:
-    """Returns until when a job's work is held at the latest, for the jobs of which some is."""
+def _held(session: Session, rows: Sequence[JobRow]) -> tuple[dict[str, datetime], set[str]]:
+    """Returns until when a job's work is held at the latest, for the jobs of which some is, and the jobs with a step that has not ended."""
+    pairs = select(PairRow.job_id, func.max(PairRow.lease_until)).group_by(PairRow.job_id).where(PairRow.state == PairState.RUNNING)
+    with_pairs = [row.id for row in rows if row.running_pairs > 0]
+    until = session.execute(pairs.where(PairRow.job_id.in_(with_pairs))).all() if with_pairs else []
+    of_running = case((StepRow.state == StepState.RUNNING, StepRow.lease_until))  # a step that was given up has the time of its last lease
+    steps = select(StepRow.job_id, func.max(of_running)).where(StepRow.state.in_(unfinished(STEP))).group_by(StepRow.job_id)
+    of_steps = session.execute(steps.where(StepRow.job_id.in_(_ids(rows)))).all()
     found: dict[str, datetime] = {}
-    for model, state, some in (
-        (PairRow, PairState.RUNNING, [row for row in rows if row.running_pairs > 0]),
-        (StepRow, StepState.RUNNING, rows),
-    ):
-        latest = func.max(model.lease_until)
-        query = select(model.job_id, latest).where(model.state == state, model.job_id.in_(_ids(some)))
-        for job_id, until in session.execute(query.group_by(model.job_id)) if some else ():
-            if until is not None:
-                found[job_id] = max(until, found.get(job_id, until))
-    return found
-
-
-def _waiting_steps(session: Session, rows: Sequence[JobRow]) -> Collection[str]:
-    """Returns the jobs that have a step which nobody does."""
-    open_steps = select(StepRow.job_id).where(StepRow.job_id.in_(_ids(rows)), StepRow.state.in_(unfinished(STEP))).distinct()
-    return set(session.scalars(open_steps))
+    for job_id, latest in (*until, *of_steps):
+        if latest is not None:
+            found[job_id] = max(latest, found.get(job_id, latest))
+    return found, {job_id for job_id, _ in of_steps}

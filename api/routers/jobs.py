@@ -9,10 +9,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from threading import Lock
 from typing import Annotated
 
+from cachetools import TTLCache, cached
 from fastapi import APIRouter, Header, Query, Response, status
 from pydantic import Field
+from sqlalchemy import Engine
 
 from api import held, submission, timeline
 from api.access import READ, SUBMIT, Admin, Db, Submitter
@@ -60,6 +63,8 @@ from jobs.registry import KINDS
 
 MOST_PAIRS = 5000
 """One page of a pair matrix has at most this many results."""
+KEPT_SECONDS = 1.0
+"""So long it is kept which workers there are, and which jobs wait."""
 
 IdempotencyKey = Annotated[str | None, Header(min_length=1, max_length=200, description="The same key and body give the same job.")]
 Label = Annotated[
@@ -161,10 +166,16 @@ def cancel_jobs(body: CancelRequest, db: Db, announce: Announce) -> JobList:
 def described(db: Database, rows: Sequence[JobRow]) -> list[Job]:
     """Describes jobs: with what they do now, how far they are, their labels and the shares of their last regions."""
     with db.read() as session:
-        does, settled = activity.of_jobs(session, rows), progress.of_jobs(session, rows)
+        does, settled = activity.of_jobs(session, rows, _kept(db.reader)), progress.of_jobs(session, rows)
         shares = regions.shares(session, [row.region_id for row in rows if row.region_id is not None])
         known = labels.of_jobs(session, [row.id for row in rows])
     return [Job.of(row, does[row.id], settled.get(row.id), shares.get(row.region_id or ""), known.get(row.id, {})) for row in rows]
+
+
+@cached(TTLCache(maxsize=4, ttl=KEPT_SECONDS), lock=Lock())
+def _kept(_reader: Engine) -> activity.Kept:
+    """Returns what all jobs and workers of a database do, as it is known for a moment: many people look at jobs at the same time."""
+    return activity.Kept()
 
 
 @router.get("")

@@ -105,6 +105,19 @@ def test_jobs_wait_behind_those_that_get_a_worker_first(db: Database) -> None:
         assert does(session, *waiting) == ["queued: behind 2 others", "queued: next", "queued: behind 1 other"]
 
 
+def test_who_keeps_what_was_asked_about_all_jobs_still_places_one_that_came_since(db: Database) -> None:
+    kept = activity.Kept()
+    with db.write() as session:
+        crew(session, SOLVER, CONTROL)
+        first = a_job(session)
+        assert activity.of_jobs(session, [first], kept) == {first.id: "queued: next"}
+        second = a_job(session)
+        assert activity.of_jobs(session, [second], kept) == {second.id: "queued: behind 1 other"}
+        workers.leave(session, CONTROL.process)
+        assert activity.of_jobs(session, [first], kept) == {first.id: "queued: next"}, "the database was not asked again"
+        assert does(session, first) == ["queued: no control worker"]
+
+
 def test_jobs_of_other_projects_count_among_the_others(db: Database) -> None:
     with db.write() as session:
         crew(session, SOLVER, CONTROL)
