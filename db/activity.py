@@ -21,6 +21,7 @@ from db.workers import WorkerKind
 
 WORKING = "working"
 QUEUED = "queued"
+ENDING = "ending: what it has begun is being stopped"
 STALLED = "stalled: its worker gives no sign of life"
 STARTING = "workers get ready"
 COMPILING = "workers compile, which takes some minutes, once"
@@ -65,7 +66,7 @@ def of_jobs(session: Session, rows: Sequence[JobRow], kept: Kept | None = None) 
         elif row.open_pairs > 0 or row.id in waiting:
             found[row.id] = queues.of_work(row.id)
         elif grown:
-            found[row.id] = grown[0]
+            found[row.id] = next((said for said in grown if said != JobState.CANCELLING), ENDING)
         elif row.state == JobState.QUEUED:
             found[row.id] = queues.of_begin(row.id)
         else:

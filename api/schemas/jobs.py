@@ -45,7 +45,8 @@ class Job(BaseModel):
     status: str = Field(
         description="What the job does now, in words for people. `working`: somebody works on it. `queued: ` goes on with why nobody does: "
         "`no worker`, `no control worker`, `all workers paused`, `workers compile, which takes some minutes, once`, `behind 3 others` or "
-        "`next`. `stalled: ` goes on with what gives no sign of life. Else it is the state.",
+        "`next`. `stalled: ` goes on with what gives no sign of life, `ending: ` with what is being "
+        "stopped. Else it is the state.",
         examples=["queued: no worker"],
     )
     outcome: Outcome | None = Field(description="Outcome for the polytope or the motion asked for; null before the job ends.")

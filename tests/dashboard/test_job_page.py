@@ -101,6 +101,11 @@ def test_the_page_finds_out_who_works_without_an_event(page: Any, url: str, data
     page.get_by_text("No process works on the job at this moment.").wait_for()
     assert page.locator(".title .badge").text_content() == "queued: no worker"
     page.get_by_text("Queued: no worker.").wait_for()
+    asked: list[float] = []
+    page.on("request", lambda request: asked.append(time.monotonic()) if request.url.endswith("/workers") else None)
+    while len(asked) < 3:
+        page.wait_for_timeout(100)
+    assert asked[2] - asked[0] < 6, "it asks each second while the job is queued"
     with database.write() as session:
         assert work.claim(session, job.id, lease_seconds=60, batch_seconds=0.5) is not None
     page.locator(".workers li", has_text=re.compile(r"Looking for a starting region around the seed, for \d s")).wait_for()

@@ -103,8 +103,9 @@ def test_a_zip_with_several_scenes_asks_for_one(page: Any, url: str, tmp_path: P
 def test_a_robot_without_its_meshes_says_which_file_is_missing(page: Any, url: str, tmp_path: Path, complaints: list[str]) -> None:
     (tmp_path / "arm.urdf").write_text(urdf("arm"))
     upload(page, url, tmp_path / "arm.urdf")
-    page.get_by_text("arm.urdf takes a file from the package arm_description, and the zip has no meshes/link.obj").wait_for()
-    page.get_by_text("A single file brings no meshes along. Choose its folder instead.").wait_for()
+    takes = "arm.urdf takes a file from the package arm_description, such as meshes/link.obj."
+    page.get_by_text(f"{takes} A single file brings none along: choose the folder that has the model and these files.").wait_for()
+    assert page.get_by_text("the zip").count() == 0, "nobody has given one"
     complaints.clear()
 
 

@@ -153,6 +153,23 @@ def test_a_job_works_while_somebody_decides(db: Database) -> None:
         assert does(session, job) == ["working"]
 
 
+def test_a_cover_that_ends_is_not_called_cancelled(db: Database) -> None:
+    """Nobody has cancelled it: it stops the jobs of its last regions."""
+    with db.write() as session:
+        crew(session, SOLVER, CONTROL)
+        cover = a_job(session)
+        cover.state = JobState.RUNNING
+        first, second = (a_job(session) for _ in range(2))
+        for child in (first, second):
+            child.parent_id = cover.id
+        first.state = JobState.CANCELLING
+        session.flush()
+        assert does(session, cover) == ["queued: next"], "the second one goes on"
+        second.state = JobState.CANCELLING
+        session.flush()
+        assert does(session, cover) == ["ending: what it has begun is being stopped"]
+
+
 @pytest.mark.parametrize("working", [True, False])
 def test_a_cover_does_what_its_regions_do(db: Database, working: bool) -> None:
     with db.write() as session:

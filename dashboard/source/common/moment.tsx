@@ -92,7 +92,7 @@ export function MomentText({ moment }: { moment: Moment }) {
       ) : map ? (
         <span class="proved">In proved cells of the <a href={`/jobs/${map}`}>map</a>. No collision of the scene's pairs, as proved.</span>
       ) : (
-        <span><span class="computed">No collision (computed, not proved)</span>, and in no certified region{nearest && <>; the nearest is {nearest.region ? <a href={`/regions/${nearest.region}`}>{nearest.region.slice(0, 8)}</a> : <>in the <a href={`/jobs/${nearest.map}`}>map</a></>}, {nearest.distance.toPrecision(3)} away in s</>}.</span>
+        <span><span class="computed">No collision (computed, not proved)</span>, and in no certified region{nearest && <>; the nearest is {nearest.region ? <a href={`/regions/${nearest.region}`}>{nearest.region.slice(0, 8)}</a> : <>in the <a href={`/jobs/${nearest.map}`}>map</a></>}</>}.</span>
       )}
     </p>
   );

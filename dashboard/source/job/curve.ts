@@ -32,7 +32,7 @@ export interface Measure {
 
 const KEPT: Measure = {
   title: "Kept of the starting region, over time",
-  reached: "of the starting region is certified",
+  reached: "of the starting region is kept",
   proved: "each region is certified by its own proof",
   number: "Iteration",
   points: async (job) => {

@@ -15,6 +15,8 @@ export interface Drawable {
 const SYNC_MS = 500;
 const SLOW_MS = 4000;
 const AGAIN_MS = 5000;
+/** No event tells that a worker has begun with a job that waited. */
+const QUEUED_MS = 1000;
 const EVENTS = 100;
 const MOST_EVENTS = 2000;
 /** So many iterations are asked for before anything is shown; those before them follow. */
@@ -138,11 +140,15 @@ export class JobStore {
 
   /** Follows the events. Between them a step may begin, and a worker come or go, so the rest is asked for again now and then. */
   private listen(): void {
-    const again = setInterval(() => {
+    let again: ReturnType<typeof setTimeout>;
+    const later = (): void => void (again = setTimeout(ask, document.querySelector(".title .badge.queued") ? QUEUED_MS : AGAIN_MS));
+    const ask = (): void => {
+      later();
       if (document.hidden) return;
       this.headSoon();
       void this.attempt(() => this.who());
-    }, AGAIN_MS);
+    };
+    later();
     const unfollow = follow(
       this.job,
       this.events.at(-1)?.seq ?? 0,
@@ -151,7 +157,7 @@ export class JobStore {
       () => this.end(),
     );
     this.stop = () => {
-      clearInterval(again);
+      clearTimeout(again);
       unfollow();
     };
   }

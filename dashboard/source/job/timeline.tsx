@@ -179,7 +179,7 @@ function Chart({ told, store, subject, setRange }: { told: Told; store: JobStore
             <svg class="bar" viewBox="0 0 1 1" aria-hidden="true">
               <rect class={name} width="1" height="1" />
             </svg>{" "}
-            {name === "step" ? `another step towards ${subject}` : name === "error" ? "error, or lost work" : name.replaceAll("_", " ")}
+            {name === "step" ? `${there.length > 1 ? "other work" : "work"} for ${subject}` : name === "error" ? "error, or lost work" : name.replaceAll("_", " ")}
           </span>
         ))}
       </p>

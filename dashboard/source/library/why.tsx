@@ -58,10 +58,10 @@ function why(plan: PlanResponse, names: string[], units: ("rad" | "m")[]): strin
     case "start_uncovered":
     case "goal_uncovered": {
       const said = `No region contains the ${reason === "start_uncovered" ? "start" : "goal"}.`;
-      return nearest ? `${said} The nearest region is ${nearest.region!.slice(0, 8)}. It is ${nearest.distance.toPrecision(3)} away in s, at ${asText(nearest.q, units)}.` : said;
+      return nearest ? `${said} The nearest region is ${nearest.region!.slice(0, 8)}, with ${asText(nearest.q, units)}.` : said;
     }
     case "disconnected":
-      return `The ${gap!.start_regions} regions that are connected with the start do not overlap the ${gap!.goal_regions} that are connected with the goal. The gap is ${gap!.distance.toPrecision(3)} in s. ${gap!.q ? `A region that is grown at ${asText(gap!.q, units)} may join them.` : "No free configuration was found near its middle."}`;
+      return `The ${gap!.start_regions} regions that are connected with the start do not overlap the ${gap!.goal_regions} that are connected with the goal. ${gap!.q ? `A region that is grown at ${asText(gap!.q, units)} may join them.` : "No free configuration was found near its middle."}`;
     case "not_proved":
       return "Regions lead from the start to the goal, but no motion was found that is proved to lie in them.";
   }

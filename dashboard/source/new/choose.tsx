@@ -43,9 +43,10 @@ async function several(name: string, file: File): Promise<Several> {
   return { name, file, groups: GROUPS.map(([title, kind]): [string, string[]] => [title, paths.filter((path) => kind.test(path)).sort()]).filter(([, found]) => found.length > 0) };
 }
 
-/** What to do where a model was given without the files that it names. */
-function alone(name: string, reason: unknown): string {
-  return reason instanceof ServiceError && reason.code === "scene_package" && MODEL.test(name) ? " A single file brings no meshes along. Choose its folder instead." : "";
+/** What is wrong. Of a model without the files that it names, the service speaks as of a zip, which nobody has given. */
+function wrong(name: string, reason: unknown): string {
+  if (!(reason instanceof ServiceError && reason.code === "scene_package" && MODEL.test(name))) return `${where(reason)}${said(reason)}`;
+  return `${reason.message.replace(", and the zip has no ", ", such as ")}. A single file brings none along: choose the folder that has the model and these files.`;
 }
 
 /** Where in a scene file something is wrong. */
@@ -82,7 +83,7 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
     } catch (reason) {
       const found = whole && reason instanceof ServiceError && reason.code === "bundle_choice" ? await several(name, whole) : null;
       if (found?.groups.length) setChoice(found);
-      else setProblem(`${name} is no scene that can be used: ${where(reason)}${said(reason)}${alone(name, reason)}`);
+      else setProblem(`${name} is no scene that can be used: ${wrong(name, reason)}`);
     }
     setSending(null);
   };
