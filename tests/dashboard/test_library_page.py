@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import itertools
 import json
 from dataclasses import replace
@@ -131,6 +132,52 @@ def test_on_a_phone_the_buttons_of_the_view_are_over_the_robot(opened: Any) -> N
     opened.set_viewport_size({"width": 390, "height": 844})
     robot, front = opened.locator(".robot").bounding_box(), opened.get_by_role("button", name="View: front").bounding_box()
     assert robot["y"] <= front["y"] <= robot["y"] + robot["height"]
+
+
+def cut_off(page: Any, canvas: Any) -> int:
+    """How many pixels at the edge of a drawing have the colours of links."""
+    found: int = page.evaluate(
+        """async (data) => {
+            const image = await createImageBitmap(await (await fetch('data:image/png;base64,' + data)).blob());
+            const pen = new OffscreenCanvas(image.width, image.height).getContext('2d');
+            pen.drawImage(image, 0, 0);
+            const { width, height } = image;
+            let count = 0;
+            for (const [x, y, w, h] of [[3, 3, width - 6, 1], [3, height - 4, width - 6, 1], [3, 3, 1, height - 6], [width - 4, 3, 1, height - 6]]) {
+                const bytes = pen.getImageData(x, y, w, h).data;
+                for (let i = 0; i < bytes.length; i += 4) count += Math.max(...bytes.slice(i, i + 3)) - Math.min(...bytes.slice(i, i + 3)) > 60;
+            }
+            return count;
+        }""",
+        base64.b64encode(canvas.screenshot()).decode(),
+    )
+    return found
+
+
+def test_the_robot_is_in_view_wherever_it_stands_until_somebody_turns_the_view(browser: Any, url: str, planar: Scene) -> None:
+    context = browser.new_context(viewport={"width": 390, "height": 844}, bypass_csp=True)  # the test reads a picture of its own
+    page = context.new_page()
+    page.goto(f"{url}/scenes/{planar.name}?q=-1.7,-0.6")
+    canvas, slider = page.locator(".robot canvas"), page.locator(".slider input[type=number]").first
+    slider.wait_for()
+    for degrees in ("-97", "97"):
+        slider.fill(degrees)
+        slider.press("Tab")
+        page.wait_for_timeout(300)
+        assert cut_off(page, canvas) == 0, degrees
+    tools = page.locator(".view-tools").bounding_box()
+    assert tools["y"] + tools["height"] <= canvas.bounding_box()["y"], "nor is it behind the buttons"
+    page.goto(f"{url}/scenes/{planar.name}?q=0,0")
+    slider.wait_for()
+    canvas.press("+")
+    seen = []
+    for degrees in ("0", "-97", "0"):
+        slider.fill(degrees)
+        slider.press("Tab")
+        page.wait_for_timeout(1500)  # until the service has said what touches
+        seen.append(canvas.screenshot())
+    assert seen[0] == seen[2] != seen[1], "the view stays where somebody has brought it"
+    context.close()
 
 
 def test_the_slice_says_that_it_does_not_draw_the_map(page: Any, url: str, planar_region: str, planar: Scene, database: Database) -> None:

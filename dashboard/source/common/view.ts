@@ -79,6 +79,11 @@ export class View {
   private reach = 1; // metres
   private ghosts: three.InstancedMesh[] = [];
   private home = { position: new three.Vector3(), target: new three.Vector3() };
+  /** Where the robot has been so far: all of it is to be seen from home. */
+  private been = new three.Box3();
+  /** Whether somebody has chosen from where to look. Then the view stays there. */
+  private chosen = false;
+  private grabbed = false;
   private asked = 0;
   private touching: number[][] = [];
   private readonly marks: three.Mesh<three.SphereGeometry, three.MeshBasicMaterial>[] = [];
@@ -114,6 +119,7 @@ export class View {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = false;
     this.controls.addEventListener("change", () => this.draw());
+    this.controls.addEventListener("start", () => (this.chosen = true));
     canvas.addEventListener("pointerdown", (event) => this.grab(event), { capture: true }); // before the controls, which turn the view
     this.scene.add(new three.HemisphereLight("#ffffff", "#8a8f98", 1.7));
     const sun = new three.DirectionalLight("#ffffff", 1.8);
@@ -132,12 +138,10 @@ export class View {
 
   /** Puts the camera where it sees the robot, and a grid under it. */
   private frame(): three.GridHelper {
-    const box = new three.Box3();
-    for (const { mesh, colour } of this.drawn) if (colour !== null) box.expandByObject(mesh);
+    const box = this.been.copy(this.links());
     const sphere = box.getBoundingSphere(new three.Sphere());
     const reach = (this.reach = Math.max(sphere.radius, 0.1));
-    this.home.target.copy(sphere.center);
-    this.home.position.copy(sphere.center).add(new three.Vector3(1.6, -2.4, 1.3).multiplyScalar(1.25 * reach));
+    this.settle();
     this.camera.near = reach / 100;
     this.camera.far = reach * 60;
     this.reset();
@@ -148,6 +152,29 @@ export class View {
     (grid.material as three.Material).opacity = 0.25;
     this.scene.add(grid);
     return grid;
+  }
+
+  /** A box around the links. */
+  private links(): three.Box3 {
+    const box = new three.Box3();
+    for (const { mesh, colour } of this.drawn) if (colour !== null) box.expandByObject(mesh);
+    return box;
+  }
+
+  /** Puts home where all places are seen in which the robot has been. */
+  private settle(): void {
+    const { center, radius } = this.been.getBoundingSphere(new three.Sphere());
+    this.home.target.copy(center);
+    this.home.position.copy(center).add(new three.Vector3(1.6, -2.4, 1.3).multiplyScalar(1.25 * Math.max(radius, 0.1)));
+  }
+
+  /** Keeps the robot in view where it moves, unless somebody looks from elsewhere, or pulls it. */
+  private follow(): void {
+    const links = this.links();
+    if (!this.limits || links.isEmpty() || this.been.containsBox(links)) return;
+    this.been.union(links);
+    this.settle();
+    if (!this.chosen && !this.grabbed) this.reset();
   }
 
   /** Looks at all bodies in view from a direction of the world, or from the present one, from as far as they need. */
@@ -174,6 +201,7 @@ export class View {
 
   /** Has a ball fill the view, seen from a direction. */
   private see({ center, radius }: three.Sphere, direction: three.Vector3): void {
+    this.chosen = true;
     const half = (this.camera.fov * Math.PI) / 360;
     const distance = radius / Math.sin(Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect)));
     this.controls.target.copy(center);
@@ -256,6 +284,7 @@ export class View {
 
   /** Looks from where the view began. */
   reset(): void {
+    this.chosen = false;
     this.camera.position.copy(this.home.position);
     this.controls.target.copy(this.home.target);
     this.controls.update();
@@ -264,6 +293,7 @@ export class View {
 
   /** Turns the camera about what it looks at, and comes nearer for zoom > 1. */
   turn(left: number, up: number, zoom: number): void {
+    this.chosen = true;
     const offset = this.camera.position.clone().sub(this.controls.target);
     const at = new three.Spherical().setFromVector3(new three.Vector3(offset.x, offset.z, -offset.y));
     at.theta -= left;
@@ -309,7 +339,12 @@ export class View {
       if (target) this.onDrag?.(pulled(pointAt, this.q, target, this.model.q_lower, this.model.q_upper));
     };
     canvas.addEventListener("pointermove", drag);
-    canvas.addEventListener("lostpointercapture", () => canvas.removeEventListener("pointermove", drag), { once: true });
+    this.grabbed = true;
+    const released = (): void => {
+      canvas.removeEventListener("pointermove", drag);
+      this.grabbed = false;
+    };
+    canvas.addEventListener("lostpointercapture", released, { once: true });
   }
 
   setPose(q: number[]): void {
@@ -326,6 +361,7 @@ export class View {
     this.limits?.setPose(found);
     this.meshes?.setPose(found);
     this.square?.setPose(found);
+    this.follow();
     this.mark();
     this.draw();
   }
