@@ -143,9 +143,13 @@ def cut_off(page: Any, canvas: Any) -> int:
             pen.drawImage(image, 0, 0);
             const { width, height } = image;
             let count = 0;
-            for (const [x, y, w, h] of [[3, 3, width - 6, 1], [3, height - 4, width - 6, 1], [3, 3, 1, height - 6], [width - 4, 3, 1, height - 6]]) {
+            const [right, down] = [width - 4, height - 4];
+            for (const [x, y, w, h] of [[3, 3, right, 1], [3, down, right, 1], [3, 3, 1, down], [right, 3, 1, down]]) {
                 const bytes = pen.getImageData(x, y, w, h).data;
-                for (let i = 0; i < bytes.length; i += 4) count += Math.max(...bytes.slice(i, i + 3)) - Math.min(...bytes.slice(i, i + 3)) > 60;
+                for (let i = 0; i < bytes.length; i += 4) {
+                    const colours = bytes.slice(i, i + 3);
+                    count += Math.max(...colours) - Math.min(...colours) > 60;
+                }
             }
             return count;
         }""",
