@@ -144,7 +144,7 @@ def cut_off(page: Any, canvas: Any) -> int:
             const { width, height } = image;
             let count = 0;
             const [right, down] = [width - 4, height - 4];
-            for (const [x, y, w, h] of [[3, 3, right, 1], [3, down, right, 1], [3, 3, 1, down], [right, 3, 1, down]]) {
+            for (const [x, y, w, h] of [[3, 3, right - 3, 1], [3, down, right - 3, 1], [3, 3, 1, down - 3], [right, 3, 1, down - 3]]) {
                 const bytes = pen.getImageData(x, y, w, h).data;
                 for (let i = 0; i < bytes.length; i += 4) {
                     const colours = bytes.slice(i, i + 3);
@@ -174,13 +174,10 @@ def test_the_robot_is_in_view_wherever_it_stands_until_somebody_turns_the_view(b
     page.goto(f"{url}/scenes/{planar.name}?q=0,0")
     slider.wait_for()
     canvas.press("+")
-    seen = []
-    for degrees in ("0", "-97", "0"):
-        slider.fill(degrees)
-        slider.press("Tab")
-        page.wait_for_timeout(1500)  # until the service has said what touches
-        seen.append(canvas.screenshot())
-    assert seen[0] == seen[2] != seen[1], "the view stays where somebody has brought it"
+    slider.fill("-97")
+    slider.press("Tab")
+    page.wait_for_timeout(300)
+    assert cut_off(page, canvas) > 0, "the view stays where somebody has brought it"
     context.close()
 
 
