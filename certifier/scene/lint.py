@@ -63,7 +63,7 @@ def _substituted(scene: Scene) -> list[str]:
     findings = []
     for what, group in groups.items():
         inflation = max(g.inflation for g in group)
-        behind = "" if what != _POLYTOPES else " of these; a larger mesh.max_vertices makes it less"
+        behind = "" if what != _POLYTOPES else " of these. With a larger mesh.max_vertices they reach less far"
         reach = f", reaching at most {at_most_mm(inflation)} outside{behind}" if inflation else ""
         findings.append(f"{_several(group, lambda g: g.inflation)}: {what}{reach}")
     return findings
@@ -80,8 +80,8 @@ def _hollow(scene: Scene) -> list[str]:
         most = f"at least {1000 * max(beyond(scene, g.name) for g in group):.3g} mm"
         said = f"the hull reaches {most} beyond {standing_for(group[0])}, which is not convex, and closes its openings"
         if len(group) > 1:
-            said = f"the hulls reach beyond what they stand for, the first by {most}, and close openings"
-        findings.append(f"{_several(group, lambda g: beyond(scene, g.name))}: {said}: {what}, where that matters")
+            said = f"each has a hull that closes openings; that of the first reaches {most} beyond its shape"
+        findings.append(f"{_several(group, lambda g: beyond(scene, g.name))}: {said}. Where that matters: {what}")
     return findings
 
 
