@@ -58,7 +58,9 @@ class GivenMotion(Request):
         description="Metres that are added around every body, beyond the scene's padding. So the bodies of a pair have to be twice this "
         "farther apart.",
     )
-    clearance: Flag = Field(False, description="Whether to prove a bound that is nearly the least distance of the bodies: `clearance` of the answer.")
+    clearance: Flag = Field(
+        False, description="Whether to prove a bound that is nearly the least distance of the bodies: `clearance` of the answer."
+    )
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
