@@ -13,7 +13,8 @@ from api.access import KEYS_SECONDS
 from api.held import SAID
 from api.pages.rendering import ROOT as DASHBOARD
 from api.pages.rendering import work_in_words
-from db import keys, leases, projects, workers
+from certifier.model import Scene
+from db import jobs, keys, leases, projects, workers
 from db.keys import Scope
 from db.session import Database
 from db.states import WorkerState
@@ -86,6 +87,18 @@ def test_the_last_worker_is_not_drained_without_a_question_while_it_is_paused(pa
     assert [text.partition(".")[0] for text in asked] == ["This is the last solve worker"]
     with database.read() as session:
         assert workers.page(session).rows[0].wanted == "paused"
+
+
+def test_a_job_says_that_workers_compile_also_on_a_phone(page: Any, url: str, scene: Scene, database: Database) -> None:
+    with database.write() as session:
+        for kind, state in ((WorkerKind.CONTROL, WorkerState.RUNNING), (WorkerKind.SOLVE, WorkerState.COMPILING)):
+            workers.tell(session, Made(f"host:{kind}:1", kind, "1.2", 4, 8, 2**34), state)
+        job, _ = jobs.create(session, kind="grow", scene_id=scene.hash[:16], options={"seed": {"q": [0.0]}})
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.goto(f"{url}/jobs/{job.id}")
+    page.get_by_text("Queued: workers compile, which takes some minutes, once.").wait_for()
+    assert page.locator(".title .badge").text_content() == "queued: workers compile, which takes some minutes, once"
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
 def test_the_page_says_which_worker_is_missing(client: TestClient, database: Database) -> None:
