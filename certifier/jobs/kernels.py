@@ -8,6 +8,7 @@ are loaded in a second or two.
 from __future__ import annotations
 
 from multiprocessing import get_context
+from typing import Any
 
 import numpy as np
 
@@ -28,8 +29,10 @@ COVERED = 0.05
 """The map of the arm ends when it covers this share."""
 
 
-def warm_up() -> None:
+def warm_up() -> dict[str, Any]:
     """Grows regions of a small arm, in both ways, and a map, while another process certifies a motion. Drake is not loaded.
+
+    Returns the map's free set (certifier.map.free_set).
 
     Motions are certified by children of workers, so it is enough that what they call is kept.
     """
@@ -42,5 +45,7 @@ def warm_up() -> None:
     proposal = Proposal(C, nearer, center[0], contain, {**account, "seconds": 0.0})
     for asked in ({"stages": 1}, {"paper": {"pushes": 1}}):
         local.grow(scene, GrowthOptions.from_document({"seed": {"q": AT}, **asked}), propose=lambda _: proposal)
-    free_set(grow_map(scene, coverage=COVERED).proof)
+    grown = grow_map(scene, coverage=COVERED).proof
+    grow_map(scene, coverage=COVERED, former=grown)
     motions.join()
+    return free_set(grown)

@@ -15,10 +15,19 @@ ROOT = Path(__file__).parents[2]
 PLANAR = str(ROOT / "examples/planar_2dof/scene.yaml")
 JOBS = (
     ["grow", PLANAR, "--local", "--out", "region.proof"],
-    ["map", PLANAR, "--local", "--coverage", "0.5", "--out", "map.proof"],
+    ["map", PLANAR, "--local", "--coverage", "0.5", "--at", "0.2,-0.4", "--out", "map.proof"],
+    ["map", PLANAR, "--local", "--coverage", "0.6", "--former", "map.proof", "--out", "longer.proof"],
     ["certify-path", PLANAR, "--local", "--q", "0,0", "--q", "0.35,-0.1"],
     ["verify", "region.proof"],
+    ["verify", "longer.proof"],
+    ["free-set", "longer.proof", "--out", "free.npz"],
 )
+ASK = """
+import ciris
+free = ciris.FreeSet.load("free.npz")
+ends = [[0.2, -0.4], [0.1, 0.1]]
+free.contains(ends), free.contains_motion(ends, ends), free.proved_parts(*ends), free.open_parts(*ends), free.nearest(ends[0])
+"""
 GROW = ["grow", PLANAR, "--local"]
 TIMES = 5
 
@@ -56,6 +65,7 @@ def test_jobs_in_a_new_container_compile_nothing(tmp_path: Path) -> None:
     assert median(first) < 1.1 * median(second)
     for job in jobs:
         seconds(job, environment, tmp_path)
+    seconds([str(ROOT / "deploy/entry"), sys.executable, "-c", ASK], environment, tmp_path)
     new = [path for path in container.rglob("*") if path.is_file() and not path.is_symlink()]
     assert new == [], "a job has compiled something"
     assert {path.relative_to(image): path.read_bytes() for path in image.rglob("*") if path.is_file()} == compiled
