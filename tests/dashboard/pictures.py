@@ -203,6 +203,9 @@ def shoot(browser: Browser, address: str, picture: Picture) -> None:
     print(f"{picture.name}: first view {first:.2f} s, {picture.there!r} after {drawn:.2f} s", flush=True)
     picture.prepare(page)
     page.wait_for_timeout(2500)
+    for waiting in page.locator(".waiting").all():  # robots that are drawn once they come into view
+        waiting.scroll_into_view_if_needed()
+        page.wait_for_function("waiting => !waiting.isConnected", arg=waiting.element_handle())
     file = FOLDER / f"{picture.name}.png"
     wide = picture.size is WIDE
     if picture.part is None:
