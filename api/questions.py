@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-import asyncio
+from collections import Counter
 from collections.abc import Awaitable, Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial, wraps
 from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
+from api.turns import Turns
 from certifier.errors import CirisError
 
 SMALL, LARGE = 2, 1
 """Number of threads that answer small questions, and large ones. Each takes a connection to the database while it reads."""
-WAITING = 20
-"""Number of large questions that may wait in one process."""
+WAITING, OF_PROJECT_WAITING = 20, 10
+"""Number of large questions that may wait in one process: of all projects, and of one."""
 
 Answer = TypeVar("Answer")
-_small, _large = ThreadPoolExecutor(SMALL, "small-questions"), ThreadPoolExecutor(LARGE, "large-questions")
-_waiting: set[object] = set()
+_small, _large = Turns("small-questions", SMALL, SMALL), Turns("large-questions", LARGE, LARGE)
+_asked = Counter[str | None]()
+"""Maps a project to the number of its large questions that are answered or wait."""
 
 
 def asking(few: int) -> Callable[[Callable[..., Answer]], Callable[..., Awaitable[Answer]]]:
@@ -35,19 +36,20 @@ def asking(few: int) -> Callable[[Callable[..., Answer]], Callable[..., Awaitabl
     def route(endpoint: Callable[..., Answer]) -> Callable[..., Awaitable[Answer]]:
         @wraps(endpoint)
         async def ask(body: BaseModel, **options: Any) -> Answer:
-            loop, answer = asyncio.get_running_loop(), partial(endpoint, body, **options)
+            project, answer = getattr(options.get("db"), "project", None), partial(endpoint, body, **options)
             if _size(body) <= few:
-                return await loop.run_in_executor(_small, answer)
-            if len(_waiting) > WAITING:
+                return await _small.run(project, answer)
+            if _asked.total() > WAITING or _asked[project] > OF_PROJECT_WAITING:
                 raise CirisError(
                     "busy", "too many large questions wait already", hint=f"try again in a while, or ask about {few} at a time"
                 )
-            turn = object()
-            _waiting.add(turn)
+            _asked[project] += 1
             try:
-                return await loop.run_in_executor(_large, answer)
+                return await _large.run(project, answer)
             finally:
-                _waiting.discard(turn)
+                _asked[project] -= 1
+                if not _asked[project]:
+                    del _asked[project]
 
         return ask
 

@@ -6,21 +6,20 @@ is not needed: a model checks its own fields when it is made. Here one of a few 
 
 from __future__ import annotations
 
-import asyncio
 import inspect
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from functools import wraps
+from functools import partial, wraps
 from typing import Any
 
 from fastapi import Response
 from pydantic import BaseModel
 
 from api.strict import StrictRoute
+from api.turns import Turns
 
 READERS = 4
 """This many threads answer reading routes. Each takes one of the process' database connections while it reads."""
-_threads = ThreadPoolExecutor(READERS, "read")
+_threads = Turns("read", READERS, READERS - 1)
 
 
 class ReadingRoute(StrictRoute):
@@ -46,6 +45,6 @@ def _in_one_visit(endpoint: Callable[..., BaseModel]) -> Callable[..., Any]:
 
     @wraps(endpoint)
     async def visit(**arguments: Any) -> Response:
-        return await asyncio.get_running_loop().run_in_executor(_threads, answer, arguments)
+        return await _threads.run(getattr(arguments.get("db"), "project", None), partial(answer, arguments))
 
     return visit

@@ -5,24 +5,25 @@ On SQLite one process writes at a time, and a writer waits for up to half a minu
 
 from __future__ import annotations
 
-import asyncio
+from collections import Counter
 from collections.abc import Awaitable, Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from functools import partial, wraps
 from typing import ParamSpec, TypeVar
 
+from api.turns import Turns
 from certifier.errors import CirisError
 
 WRITERS = 2
 """This many threads answer routes that write."""
-WAITING = 200
-"""Number of requests that may wait for them."""
+WAITING, OF_PROJECT_WAITING = 200, 100
+"""Number of requests that may wait for them: of all projects, and of one."""
 
 Given = ParamSpec("Given")
 Answer = TypeVar("Answer")
-_threads = ThreadPoolExecutor(WRITERS, "write")
-_waiting: set[object] = set()
+_threads = Turns("write", WRITERS, WRITERS)
+_asked = Counter[str | None]()
+"""Maps a project to the number of its requests that are answered or wait."""
 
 
 def writing(endpoint: Callable[Given, Answer]) -> Callable[Given, Awaitable[Answer]]:
@@ -34,14 +35,15 @@ def writing(endpoint: Callable[Given, Answer]) -> Callable[Given, Awaitable[Answ
 
     @wraps(endpoint)
     async def change(*arguments: Given.args, **options: Given.kwargs) -> Answer:
-        if len(_waiting) >= WRITERS + WAITING:
+        project = getattr(options.get("db"), "project", None)
+        if _asked.total() >= WRITERS + WAITING or _asked[project] >= WRITERS + OF_PROJECT_WAITING:
             raise CirisError("busy", "too many requests that change something wait already", hint="try again in a while")
-        turn = object()
-        _waiting.add(turn)
+        _asked[project] += 1
         try:
-            asked = partial(copy_context().run, endpoint, *arguments, **options)
-            return await asyncio.get_running_loop().run_in_executor(_threads, asked)
+            return await _threads.run(project, partial(copy_context().run, endpoint, *arguments, **options))
         finally:
-            _waiting.discard(turn)
+            _asked[project] -= 1
+            if not _asked[project]:
+                del _asked[project]
 
     return change

@@ -31,8 +31,11 @@ def go_on(monkeypatch: pytest.MonkeyPatch) -> threading.Event:
     return event
 
 
-def test_small_questions_do_not_wait_for_large_ones(url: str, region: str, go_on: threading.Event, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(questions, "WAITING", 3)
+@pytest.mark.parametrize("limit", ["WAITING", "OF_PROJECT_WAITING"])
+def test_small_questions_do_not_wait_for_large_ones(
+    url: str, region: str, go_on: threading.Event, monkeypatch: pytest.MonkeyPatch, limit: str
+) -> None:
+    monkeypatch.setattr(questions, limit, 3)
 
     async def ask() -> tuple[list[float], list[int], list[int]]:
         async with httpx2.AsyncClient(base_url=url, timeout=30.0) as client:

@@ -13,7 +13,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 
 import httpx2
@@ -23,19 +23,21 @@ from sqlalchemy import insert, select
 
 from certifier.errors import CirisError
 from ciris.synchronous.client import Client
-from db import keys, leases, migrate, projects
+from db import jobs, keys, leases, migrate, projects
 from db.keys import Scope
 from db.models import DEFAULT_PROJECT, ApiKeyRow, PairRow, StepRow
 from db.session import Database
 from db.types import utcnow
 from tests.api.test_hostile_uploads import URDF, zipped
 from tests.api.test_places import LINK
+from tests.db.builders import a_running_job
 from tests.services import Postgres
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 KEYS = 200_000
 REQUESTS = 500
+STREAMS = 300
 JITTER_MS = 5.0
 """The machine of the tests is no quieter than that."""
 
@@ -104,28 +106,58 @@ def test_keys_of_another_project_cost_nothing(database: str, tmp_path: Path, req
 
 
 @contextmanager
-def uploads_that_last(url: str, key: str) -> Iterator[Counter[int]]:
-    """Four clients send small zips with a mesh of 60 MB all the time; how often which status was answered."""
-    mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n" + "f 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n" * (60 * 2**20 // 32)
-    data = zipped(**{"arm.urdf": URDF.format(LINK), "m.obj": mesh})
-    assert len(data) < 400_000
+def all_the_time(
+    url: str, keys_of_others: list[str], clients: int, ask: Callable[[httpx2.Client], httpx2.Response]
+) -> Iterator[Counter[int]]:
+    """This many clients ask again and again; how often which status was answered."""
     over, answered = threading.Event(), Counter[int]()
 
-    def upload() -> None:
+    def repeat(key: str) -> None:
         with httpx2.Client(base_url=url, headers={"Authorization": f"Bearer {key}"}, timeout=300) as client:
             while not over.is_set():
-                answered[client.post("/v1/scenes", files={"bundle": ("scene.zip", data, "application/zip")}).status_code] += 1
+                answered[ask(client).status_code] += 1
 
-    threads = [threading.Thread(target=upload) for _ in range(4)]
+    threads = [threading.Thread(target=repeat, args=(keys_of_others[i % len(keys_of_others)],)) for i in range(clients)]
     for thread in threads:
         thread.start()
-    time.sleep(5)  # two are being read, and two wait
+    time.sleep(5)
     try:
         yield answered
     finally:
         over.set()
         for thread in threads:
             thread.join()
+
+
+@contextmanager
+def uploads_that_last(url: str, keys_of_others: list[str]) -> Iterator[Counter[int]]:
+    """Four clients send small zips with a mesh of 60 MB. Two are being read, and two wait."""
+    mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n" + "f 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n" * (60 * 2**20 // 32)
+    data = zipped(**{"arm.urdf": URDF.format(LINK), "m.obj": mesh})
+    assert len(data) < 400_000
+    upload = {"bundle": ("scene.zip", data, "application/zip")}
+    with all_the_time(url, keys_of_others[:1], 4, lambda client: client.post("/v1/scenes", files=upload)) as answered:
+        yield answered
+
+
+@contextmanager
+def reads_that_last(url: str, keys_of_others: list[str]) -> Iterator[Counter[int]]:
+    """Thirty-two clients read all pairs of a large job."""
+    with httpx2.Client(base_url=url, headers={"Authorization": f"Bearer {keys_of_others[0]}"}) as client:
+        (job,) = client.get("/v1/jobs").json()["jobs"]
+    with all_the_time(url, keys_of_others, 32, lambda client: client.get(f"/v1/jobs/{job['id']}/pairs")) as answered:
+        yield answered
+
+
+@contextmanager
+def streams_held_open(url: str, keys_of_others: list[str]) -> Iterator[Counter[int]]:
+    """Hundreds of connections listen to the events of a project."""
+    with ExitStack() as held:
+        answered = Counter[int]()
+        for i in range(STREAMS):
+            client = held.enter_context(httpx2.Client(base_url=url, headers={"Authorization": f"Bearer {keys_of_others[i % 9]}"}))
+            answered[held.enter_context(client.stream("GET", "/v1/events/stream")).status_code] += 1
+        yield answered
 
 
 @contextmanager
@@ -139,8 +171,10 @@ def jobs_of_nine_keys(url: str, keys_of_others: list[str]) -> Iterator[None]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("attack", ["uploads", "jobs"])
-def test_the_work_of_another_project_costs_requests_little(attack: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("attack", [uploads_that_last, jobs_of_nine_keys, reads_that_last, streams_held_open])
+def test_the_work_of_another_project_costs_requests_little(
+    attack: Callable[[str, list[str]], AbstractContextManager[object]], tmp_path: Path
+) -> None:
     url = f"sqlite:///{tmp_path / 'ciris.sqlite3'}"
     migrate.upgrade(url)
     db = Database(url)
@@ -148,16 +182,20 @@ def test_the_work_of_another_project_costs_requests_little(attack: str, tmp_path
         projects.add(session, "others")
         theirs = [keys.add(session, f"key{i}", Scope.SUBMIT, "others") for i in range(9)]
         own = keys.add(session, "own", Scope.SUBMIT)
+    with db.of("others").write() as session:
+        jobs.cancel(session, a_running_job(session, pair_count=5000).id)
     db.close()
     with a_service(tmp_path / "data", url, solvers=2) as service, Client(service, own) as client:
         client.add_scene(EXAMPLES / "planar_2dof" / "scene.yaml")
         latencies(service, own)
         before = latencies(service, own)
-        with uploads_that_last(service, theirs[0]) if attack == "uploads" else jobs_of_nine_keys(service, theirs) as answered:
+        with attack(service, theirs) as answered:
             after, began = latencies(service, own), time.monotonic()
             client.add_scene(EXAMPLES / "planar_2dof" / "scene.yaml")
             upload_seconds = time.monotonic() - began
-    print(f"{attack}: milliseconds before and beside it: {before} {after}; an upload of its own {upload_seconds:.1f} s; {answered}")
+    print(
+        f"{attack.__name__}: milliseconds before and beside it: {before} {after}; an upload of its own {upload_seconds:.1f} s; {answered}"
+    )
     assert after["p99"] < 2 * before["p99"] + JITTER_MS
     assert upload_seconds < 10
 

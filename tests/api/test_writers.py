@@ -54,8 +54,11 @@ def test_readers_never_wait_for_writers(database: Database, url: str, scene: Sce
     assert written == [201] * WAITING
 
 
-def test_too_many_writers_are_told_to_come_again(database: Database, url: str, scene: Scene, sqlite_url: str, monkeypatch: Any) -> None:
-    monkeypatch.setattr(writing, "WAITING", 1)
+@pytest.mark.parametrize("limit", ["WAITING", "OF_PROJECT_WAITING"])
+def test_too_many_writers_are_told_to_come_again(
+    database: Database, url: str, scene: Scene, sqlite_url: str, monkeypatch: Any, limit: str
+) -> None:
+    monkeypatch.setattr(writing, limit, 1)
     other = Database(sqlite_url)
     held = other.writer.connect()
     held.begin()

@@ -1,0 +1,74 @@
+"""Threads that projects share: whoever has many requests delays nobody else, and each is answered in the end."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from threading import Event
+
+import pytest
+
+from api.turns import Turns
+
+
+def test_a_thread_is_left_to_others_however_many_requests_a_project_has() -> None:
+    turns, go, begun = Turns("test", threads=3, of_project=2), Event(), list[int]()
+
+    def slow(number: int) -> Callable[[], int]:
+        def answer() -> int:
+            begun.append(number)
+            assert go.wait(30)
+            return number
+
+        return answer
+
+    async def ask() -> list[int]:
+        many = [asyncio.create_task(turns.run("many", slow(number))) for number in range(20)]
+        await asyncio.sleep(0.2)
+        assert begun == [0, 1]
+        for _ in range(3):
+            assert await asyncio.wait_for(turns.run("one", lambda: "at once"), 10) == "at once"
+        assert begun == [0, 1]
+        go.set()
+        return await asyncio.wait_for(asyncio.gather(*many), 30)
+
+    assert asyncio.run(ask()) == list(range(20))
+    assert begun == list(range(20)), "in the order in which they came"
+
+
+def test_projects_take_turns_at_one_thread() -> None:
+    turns, go, order = Turns("test", threads=1, of_project=1), Event(), list[str]()
+
+    async def ask() -> None:
+        first = asyncio.create_task(turns.run("first", lambda: go.wait(30)))
+        await asyncio.sleep(0.1)
+        rest = [asyncio.create_task(turns.run(name, lambda name=name: order.append(name))) for name in "aaaabbc"]  # type: ignore[misc]
+        await asyncio.sleep(0.1)
+        go.set()
+        await asyncio.wait_for(asyncio.gather(first, *rest), 30)
+
+    asyncio.run(ask())
+    assert order == list("abcabaa")
+
+
+def test_who_is_gone_takes_no_time_and_an_error_comes_back() -> None:
+    turns, go, begun = Turns("test", threads=1, of_project=1), Event(), list[str]()
+
+    def wrong() -> None:
+        raise ValueError("wrong")
+
+    async def ask() -> None:
+        first = asyncio.create_task(turns.run("a", lambda: go.wait(30)))
+        await asyncio.sleep(0.1)
+        gone = asyncio.create_task(turns.run("a", lambda: begun.append("gone")))
+        last = asyncio.create_task(turns.run("a", wrong))
+        await asyncio.sleep(0.1)
+        gone.cancel()
+        go.set()
+        await first
+        with pytest.raises(ValueError, match="wrong"):
+            await last
+        assert await asyncio.wait_for(turns.run("a", lambda: 1), 10) == 1
+
+    asyncio.run(ask())
+    assert begun == []
