@@ -13,6 +13,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from pydrake.planning import IrisZoOptions
 
 from certifier import stored
 from certifier.errors import CirisError
@@ -130,7 +131,14 @@ def point(seconds: float, known: dict[str, Any]) -> dict[str, Any]:
 
 
 def _seed(task: Task, options: CoverOptions, method: Method) -> dict[str, Any]:
-    return SeedOptions(method=method, q=task.q, contain=task.contain, random_seed=options.random_seed).to_document()
+    """Returns the options of one region; IrisZo has Drake's own, which ask for less than the service's."""
+    more: dict[str, Any] = {}
+    if method is Method.IRIS_ZO:
+        drakes = IrisZoOptions().sampled_iris_options
+        same = ("epsilon", "delta", "max_iterations", "max_iterations_separating_planes")
+        more = {name: getattr(drakes, name) for name in same}
+        more |= {"tolerance": drakes.relative_termination_threshold, "margin": drakes.configuration_space_margin}
+    return SeedOptions(method=method, q=task.q, contain=task.contain, random_seed=options.random_seed, **more).to_document()
 
 
 def _iris(scene: dict[str, Any], seed: dict[str, Any]) -> dict[str, Any]:

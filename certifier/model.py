@@ -292,9 +292,7 @@ class Scene(ConfigurationSpace):
             SceneError: ``no_pairs``.
         """
         if not self.pairs:
-            hint = (
-                "give the robot's links collision geometry (<collision> in a URDF), add what they may hit, or ignore fewer pairs"
-            )
+            hint = "give the robot's links collision geometry (<collision> in a URDF), add what they may hit, or ignore fewer pairs"
             raise SceneError("no_pairs", f"{NO_PAIRS}, so there is nothing to prove", field=field, hint=hint)
 
     @cached_property

@@ -32,6 +32,10 @@ leaf. Of an oblique cut, ``upper`` is the row of its normal, ``cut`` is in s, an
 DEPTH = 512
 """Trees are not deeper than this; ciris.free_set refuses others."""
 
+TOGETHER = 256
+"""This many configurations are looked up together. What a tree says of each is kept meanwhile: several clauses have the same trees."""
+UNKNOWN, NEAR = 0, 10
+"""Of a configuration that was not looked up in a tree yet; NEAR is added to the leaf of one that is near a cut."""
 ROOM = 64
 """There is room for this many ranges at first."""
 HALVINGS, CLOSE = 16, 1e-4
@@ -98,11 +102,16 @@ def spans_of(normals: Floats) -> NDArray[np.int32]:
 
 @njit(cache=True, nogil=True)
 def points(cells: Cells, X: Floats, found: NDArray[np.bool_]) -> None:
-    """Fills in which configurations (m, n) are within the joint limits and free.
+    """Fills in which configurations (m, n) are within the joint limits and free."""
+    for begin in range(0, len(X), TOGETHER):
+        _points(cells, X[begin : begin + TOGETHER], found[begin : begin + TOGETHER])
 
-    All of them are looked up in one tree after the other, which stays in the cache.
-    """
+
+@njit(cache=True)
+def _points(cells: Cells, X: Floats, found: NDArray[np.bool_]) -> None:
+    """Does so for a few configurations. All are looked up in one tree after the other, which stays in the cache, and once in each tree."""
     nodes, tolerance, stack, room = cells.nodes, cells.tolerance, _stack(), np.empty((2, ROOM, 2))
+    known = np.full((len(cells.root), len(X)), UNKNOWN, np.int8)
     left, count, S = np.empty(len(X), np.int64), 0, np.empty(X.shape)
     for i in range(len(X)):
         left[count] = i
@@ -115,8 +124,12 @@ def points(cells: Cells, X: Floats, found: NDArray[np.bool_]) -> None:
             i, leaf, near = left[place], OPEN, False
             for number in range(begin, end):
                 if leaf == OPEN:
-                    leaf, close = _leaf(cells, nodes, tolerance, cells.root[cells.tree[number]], X[i], S[i])
-                    near = near or close
+                    tree = cells.tree[number]
+                    leaf = known[tree, i]
+                    if leaf == UNKNOWN:
+                        leaf = known[tree, i] = _leaf(cells, nodes, tolerance, cells.root[tree], X[i], S[i])
+                    if leaf > 0:
+                        leaf, near = leaf - NEAR, True
             if near:
                 open_parts = _open_in_clause(cells, clause, X[i], X[i], True, stack, room[0], room[1])[1]
                 leaf = PROVED if open_parts == 0 else OPEN
@@ -129,20 +142,20 @@ def points(cells: Cells, X: Floats, found: NDArray[np.bool_]) -> None:
 
 
 @njit(cache=True)
-def _leaf(cells: Cells, nodes: NDArray[np.void], tolerance: Floats, root: int, x: Floats, s: Floats) -> tuple[int, bool]:
-    """Returns the leaf of a tree that a configuration is in, and whether it is nearer to a cut of a joint than the tolerance."""
+def _leaf(cells: Cells, nodes: NDArray[np.void], tolerance: Floats, root: int, x: Floats, s: Floats) -> int:
+    """Returns the leaf of a tree that a configuration is in, and adds NEAR where it is nearer to a cut of a joint than the tolerance."""
     node, near = root, False
     while node >= 0:
         at = nodes[node]
         if at.joint == OBLIQUE:
             if along(cells, at.upper, s) <= at.cut:
-                return PROVED, near
+                return PROVED + NEAR * near
             node = lower_part(nodes, node)
             continue
         beyond = x[at.joint] - at.cut
         near = near | (abs(beyond) <= tolerance[at.joint])
         node = at.upper if beyond > 0 else lower_part(nodes, node)
-    return node, near
+    return node + NEAR * near
 
 
 @njit(cache=True)
