@@ -64,7 +64,7 @@ from jobs.registry import KINDS
 MOST_PAIRS = 5000
 """One page of a pair matrix has at most this many results."""
 KEPT_SECONDS = 1.0
-"""So long it is kept which workers there are, and which jobs wait."""
+"""Which workers there are, and which jobs wait, is kept for this time."""
 
 IdempotencyKey = Annotated[str | None, Header(min_length=1, max_length=200, description="The same key and body give the same job.")]
 Label = Annotated[
