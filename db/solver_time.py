@@ -22,7 +22,7 @@ HALF_LIFE_SECONDS = 15.0
 """After this time, work counts half when projects and keys take turns: longer than most pieces of work, and soon enough that nobody pays
 for long for having had all solvers while nobody else wanted them."""
 FORGOTTEN_SECONDS = 10 * HALF_LIFE_SECONDS
-"""Keys for which nothing was saved for so long count as if nobody had ever worked for them."""
+"""Keys for which nothing was saved in this time count as if nobody had ever worked for them."""
 
 
 def add(session: Session, project: str, seconds: float, key_id: str | None = None) -> None:
