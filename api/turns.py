@@ -29,11 +29,14 @@ class Turns:
 
     async def run(self, project: str | None, function: Callable[[], Answer]) -> Answer:
         """Calls the function in a thread when it is the project's turn. What is of no project (None) may have all threads."""
+        return await asyncio.wrap_future(self._asked(project, function))
+
+    def _asked(self, project: str | None, function: Callable[[], Answer]) -> Future[Answer]:
         done: Future[Answer] = Future()
         with self._lock:
             self._waiting.setdefault(project, deque()).append((done, function))
         self._pool.submit(self._next)
-        return await asyncio.wrap_future(done)
+        return done
 
     def _next(self) -> None:
         """Answers one request. It is called once for each."""
@@ -55,6 +58,7 @@ class Turns:
                 except BaseException as error:
                     done.set_exception(error)
         finally:
+            del calls, done, function  # or else an error and this frame, where it came by, hold each other
             with self._lock:
                 self._running[project] -= 1
                 again, self._passed = self._passed > 0, max(self._passed - 1, 0)

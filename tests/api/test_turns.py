@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import gc
+import weakref
 from collections.abc import Callable
+from contextlib import suppress
 from threading import Event
 
 import pytest
@@ -51,6 +54,28 @@ def test_projects_take_turns_at_one_thread() -> None:
     assert order == list("abcabaa")
 
 
+def test_an_error_holds_nothing_once_it_is_answered() -> None:
+    """The service seldom looks for garbage, and what a request has read may be large."""
+    turns, read = Turns("test", threads=1, of_project=1), list[weakref.ref[Event]]()
+
+    def wrong() -> None:
+        large = Event()
+        read.append(weakref.ref(large))
+        raise ValueError
+
+    async def ask() -> None:
+        with suppress(ValueError):
+            await turns.run("a", wrong)
+        await turns.run("a", lambda: None)  # the thread is done with the first one
+
+    gc.disable()
+    try:
+        asyncio.run(ask())
+        assert read[0]() is None
+    finally:
+        gc.enable()
+
+
 def test_who_is_gone_takes_no_time_and_an_error_comes_back() -> None:
     turns, go, begun = Turns("test", threads=1, of_project=1), Event(), list[str]()
 
@@ -64,6 +89,8 @@ def test_who_is_gone_takes_no_time_and_an_error_comes_back() -> None:
         last = asyncio.create_task(turns.run("a", wrong))
         await asyncio.sleep(0.1)
         gone.cancel()
+        with suppress(asyncio.CancelledError):
+            await gone
         go.set()
         await first
         with pytest.raises(ValueError, match="wrong"):
