@@ -130,9 +130,7 @@ def advance(
             break
         looked += 1
         if kept.bounds[kept.held[0]].max() + needed > len(streams.pieces):
-            held, more = len(streams.pieces), _streams(2 * len(streams.pieces))
-            more.pieces[:held], more.counts[:held], more.multipliers[:held] = streams.pieces, streams.counts, streams.multipliers
-            streams = more
+            streams = _larger(streams)
         joint, cell, size = _tried(pairs, levels, work, cell, size, order, samples, proofs, first, kept, streams)
         if joint >= 0 and _cut(levels, work, cell, size, joint, order, samples):
             for child in range(size, size + 2):
@@ -147,6 +145,17 @@ def advance(
 @njit(cache=True)
 def _streams(room: int) -> Streams:
     return Streams(np.empty(room, np.int8), np.empty(room, np.int16), np.empty(room, np.float32))
+
+
+@njit(cache=True)
+def _larger(streams: Streams) -> Streams:
+    """Returns twice the room, with what the streams hold."""
+    held = len(streams.pieces)
+    more = _streams(2 * held)
+    more.pieces[:held] = streams.pieces
+    more.counts[:held] = streams.counts
+    more.multipliers[:held] = streams.multipliers
+    return more
 
 
 @njit(cache=True)

@@ -11,11 +11,14 @@ import pytest
 
 from certifier.errors import ProofError
 from certifier.jobs.map import _adopted, grow_map, grow_round, ways_of
+from certifier.map import growing as growing_module
 from certifier.map.free_set import as_file, free_set
 from certifier.map.growing import Growing
+from certifier.map.pair import PIECES
 from certifier.map.trees import FEW_JOINTS, Plan
 from certifier.model import WORLD, Joint, JointKind, Pair
 from certifier.pair.collisions import in_collision
+from certifier.partition.sides import room_for
 from certifier.proof import limits
 from certifier.proof.map import MapProof, PairMap
 from certifier.proof.partition import OBLIQUE, OPEN, PLANE
@@ -84,7 +87,7 @@ def test_most_of_the_free_configurations_are_proved_and_none_in_collision(grown)
     share = proved[~collides].mean()
     assert share >= 0.93
     assert found.coverage.share == pytest.approx(share, abs=0.03)
-    assert found.reason == "coverage"
+    assert (found.reason, found.refused) == ("coverage", 0)
 
 
 def test_its_file_is_read_again_and_holds(grown):
@@ -199,6 +202,30 @@ def grown_until(growing, enough):
             tree = growing.trees[task.pairs].pair
             growing.take(task, tree.advance(task.given, task.samples, task.weights, task.most, task.water))
     return growing.looked
+
+
+def test_a_task_with_many_pieces_is_accepted_by_the_verifier():
+    scene = planar_arm(3, ball("world/obstacle", WORLD, 0.2, (0.8, 0.9, 0.0)))
+    growing = Growing(scene, np.zeros((0, 3)))
+    tree = max(growing.trees.values(), key=lambda tree: tree.pair.joints)
+    samples = growing._samples[tree.cells.numbers][:, tree.pair.positions]
+    given = tree.pair.root(np.arange(len(samples)))
+    found = tree.pair.verified(given, tree.pair.advance(given, samples, np.ones(len(samples)), 3000, 0.0))
+    vertices = sum(len(volume.vertices) for volume in tree.pair._volumes)
+    assert len(found.proved.pieces) > 4 * len(room_for(vertices, PIECES).pieces), "the room for pieces was made larger"
+    assert found.looked > 0
+
+
+def test_samples_that_are_never_proved_do_not_keep_new_ones_away(monkeypatch):
+    growing = Growing(planar_arm(2, CROWDED), np.zeros((0, 2)))
+    grown_until(growing, lambda growing: growing.coverage.share > 0.5)
+    cells = max((tree.cells for tree in growing.trees.values()), key=lambda cells: np.diff(cells.samples).max())
+    lost = np.diff(cells.samples).argmax()
+    cells.level[lost] = 0
+    monkeypatch.setattr(growing_module, "WANTED", np.diff(cells.samples)[lost] // 2)
+    before = len(growing._samples)
+    grown_until(growing, lambda growing: len(growing._samples) > before)
+    assert len(growing._samples) > before
 
 
 def test_a_map_that_has_ended_does_not_grow_on():
