@@ -190,6 +190,8 @@ LONGER_PAUSE_SECONDS = 15.0
 FEWEST_PAIRS = 5040
 """Those of one job. Where fewer are certified meanwhile, the solvers had hardly anything to do."""
 GROWTH = 1.1
+OF_MESSAGES_MIB = 5.0
+"""A part that is as small as the queue may grow by this: it holds the messages of jobs that wait."""
 POSTS_AROUND = 720
 
 
@@ -290,7 +292,7 @@ def test_no_process_grows_in_fifteen_minutes_of_two_hundred_clients(service: Loa
         )
     assert set(tally.statuses) <= {200, 201}
     assert done >= FEWEST_PAIRS
-    assert all(after[name] < GROWTH * before[name] for name in before)
+    assert all(after[name] < max(GROWTH * before[name], before[name] + OF_MESSAGES_MIB) for name in before)
 
 
 WRITERS = 8
