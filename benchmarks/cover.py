@@ -121,7 +121,7 @@ def picture(document: dict[str, Any]) -> str:
     for row in document["rows"]:
         series = {WAYS[way]: [(point["seconds"], point["coverage"]) for point in run["points"]] for way, run in row["runs"].items()}
         panels.append(Panel(row["scene"], series))
-    return draw(panels, "share of the free configurations, over seconds", share=True)
+    return draw(panels, "share covered, over seconds", share=True)
 
 
 @contextmanager
