@@ -124,9 +124,12 @@ def test_a_first_start_says_that_the_solvers_compile(tmp_path: Path) -> None:
             assert stack.stderr is not None
             assert next(line for line in stack.stderr if line.startswith("note: ")) == f"note: {COMPILES}\n"
             url = json.loads((data / "stack.json").read_text())["url"]
-            said = httpx.get(f"{url}/v1/workers").json()
-            assert said["missing"] == [COMPILING]
-            assert {worker["kind"]: worker["state"] for worker in said["workers"]} == {"solve": "compiling", "control": "running"}
+
+            def states() -> dict[str, str]:
+                return {worker["kind"]: worker["state"] for worker in httpx.get(f"{url}/v1/workers").json()["workers"]}
+
+            eventually(lambda: states() == {"solve": "compiling", "control": "running"}, "the control worker runs, the other one compiles")
+            assert httpx.get(f"{url}/v1/workers").json()["missing"] == [COMPILING]
         finally:
             stack.terminate()
 
