@@ -258,12 +258,12 @@ class Growing(Trees):
     @property
     def wants(self) -> bool:
         """Returns whether a configuration that was asked for is in an open cell that is looked at still."""
-        return bool((self._may_be_proved[self._wanted] & (self._open[self._wanted] > 0)).any())
+        return bool(self._useful[self._wanted].any())
 
     @property
-    def _may_be_proved(self) -> NDArray[np.bool_]:
-        """Returns which samples are in no cell that is not looked at any more, (S,). The others are never proved, whatever else is."""
-        found = np.ones(len(self._samples), dtype=bool)
+    def _useful(self) -> NDArray[np.bool_]:
+        """Returns which samples are open, (S,), but in no cell that is not looked at any more: such a sample is never proved."""
+        found = self._open > 0
         for tree in self.trees.values():
             found[tree.cells.numbers[np.repeat(tree.cells.level == 0, np.diff(tree.cells.samples))]] = False
         return found
@@ -276,8 +276,7 @@ class Growing(Trees):
     def round(self) -> list[Task]:
         """Returns the tasks of the next round, in an order that is always the same; none where nothing is left to do."""
         self._draw()
-        useful = (self._open > 0) & self._may_be_proved
-        of_samples = np.where(useful, self._value / np.maximum(self._open, 1), 0.0)
+        of_samples = np.where(self._useful, self._value / np.maximum(self._open, 1), 0.0)
         names = list(self.trees)
         weights = [self.trees[name].weights(of_samples) for name in names]
         number = np.repeat(np.arange(len(names)), [len(w) for w in weights])
@@ -319,7 +318,7 @@ class Growing(Trees):
         if len(self._ways):
             on_ways = self._beside(np.concatenate([self._on_ways(), self._on_cuts()]))
             self._add(on_ways, DEMAND / max(1, len(on_ways)))
-        if np.count_nonzero((self._open > 0) & (self._value > 0) & self._may_be_proved) < WANTED:
+        if np.count_nonzero(self._useful & (self._value > 0)) < WANTED:
             self._add(self._drawn(BATCH), 1.0)
 
     def _add(self, samples: Array, value: float) -> int:
