@@ -35,17 +35,19 @@ ASK_AGAIN_SECONDS = 0.2
 """Each question makes a process of the API work."""
 
 
+def start(data: Path, stream: str, **own: str) -> subprocess.Popen[str]:
+    """Starts a stack without the settings of a service that runs beside, as the session's own may."""
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("CIRIS_")}
+    own = {"CIRIS_API_PROCESSES": "2", "CIRIS_SOLVE_PROCESSES": "1", **own}  # each solve process loads Drake
+    return subprocess.Popen([*COMMAND, "--data", str(data)], cwd=ROOT, env=clean | own, text=True, **{stream: subprocess.PIPE})
+
+
 class Stack:
     """A running stack and what its stack.json says."""
 
     def __init__(self, data: Path, **own: str) -> None:
         self.data = data
-        environment = {name: value for name, value in os.environ.items() if not name.startswith("CIRIS_")} | {
-            "CIRIS_API_PROCESSES": "2",
-            "CIRIS_SOLVE_PROCESSES": "1",  # each loads Drake
-            **own,
-        }
-        self.process = subprocess.Popen([*COMMAND, "--data", str(data)], cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True)
+        self.process = start(data, "stdout", **own)
         assert self.process.stdout is not None
         assert self.process.stdout.readline() == f"ciris is up at {self.description['url']}\n"
 
@@ -117,9 +119,8 @@ def test_what_dies_is_started_again_what_is_drained_is_not_and_a_stop_leaves_not
 
 def test_a_first_start_says_that_the_solvers_compile(tmp_path: Path) -> None:
     """Where nothing is compiled yet, the worker says so itself, and the command, the API and jobs pass it on."""
-    environment = os.environ | {"CIRIS_SOLVE_PROCESSES": "1", "CIRIS_API_PROCESSES": "1", "NUMBA_CACHE_DIR": str(tmp_path / "compiled")}
     data = tmp_path / "data"
-    with subprocess.Popen([*COMMAND, "--data", str(data)], cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True) as stack:
+    with start(data, "stderr", CIRIS_API_PROCESSES="1", NUMBA_CACHE_DIR=str(tmp_path / "compiled")) as stack:
         try:
             assert stack.stderr is not None
             assert next(line for line in stack.stderr if line.startswith("note: ")) == f"note: {COMPILES}\n"
