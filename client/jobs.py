@@ -60,8 +60,8 @@ def job_show(args: Namespace) -> int:
 
 
 def _at(q: list[float] | None) -> str:
-    """Returns a configuration that an obstacle names, as it is printed after it."""
-    return "" if q is None else f" q = ({', '.join(f'{x:.4g}' for x in q)})"
+    """Returns the configuration of an obstacle in radians and metres, as other commands take it."""
+    return "" if q is None else f"\n    --q={','.join(f'{x:.6g}' for x in q)}"
 
 
 def job_follow(args: Namespace) -> int:

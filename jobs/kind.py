@@ -68,6 +68,7 @@ class Held:
         a, b: the pair's geometries.
         q: a configuration, joint positions, at which it happens; None where none is known.
         faces, lost: how many faces were added for the pair, and which share of the polytope they cut off; None where that is not known.
+        at: the words of the text that name ``q``, in degrees and metres; None where the text does not name it.
     """
 
     text: str
@@ -77,6 +78,7 @@ class Held:
     b: str | None = None
     faces: int | None = None
     lost: float | None = None
+    at: str | None = None
 
 
 class Kind:

@@ -13,6 +13,7 @@ from sqlalchemy.orm import Session
 from certifier import stored
 from certifier.conditions import called, condition_named, fails
 from certifier.growth import obstacles as growth
+from certifier.growth.whole import in_words
 from certifier.model import Pair, Scene
 from certifier.outcome import Outcome
 from db import jobs, pairs
@@ -23,6 +24,8 @@ from jobs.kind import Held, Kind
 
 WORST = (PairState.REFUTED, PairState.NOT_CERTIFIABLE, PairState.TOO_CLOSE, PairState.ERROR, PairState.INCONCLUSIVE)
 """How pairs fail, the worst first."""
+SEEN = 1e-4
+"""Of a smaller share of a polytope, samples say little."""
 
 
 def of_job(database: Database, scene: Scene, kind: Kind, job: JobRow) -> list[Held]:
@@ -43,9 +46,10 @@ def of_growth(session: Session, scene: Scene, job: JobRow) -> list[Held]:
 def of_motion(scene: Scene, stop: dict[str, Any], how: str) -> Held:
     """Returns the first place on a motion that could not be certified; ``how`` says what the two bodies do there."""
     pair = Pair(stop["a"], stop["b"])
-    text = f"{fails(pair.a, pair.b, how)} at the configuration named, the first on the motion that could not be certified."
+    at = in_words(scene, stop["q"])
+    text = f"{fails(pair.a, pair.b, how)} at {at}, the first configuration on the motion that could not be certified."
     index = scene.pairs.index(pair) if pair in scene.pairs else None
-    return Held(text, stop["q"], index, pair.a, pair.b)
+    return Held(text, stop["q"], index, pair.a, pair.b, at=at)
 
 
 def _cut(known: dict[str, Any]) -> dict[int, growth.Obstacle]:
@@ -74,50 +78,63 @@ def _of_pair(scene: Scene, index: int, cut: growth.Obstacle | None, failed: Sequ
     row = next((row for row in failed if row.state == state), None)
     witness = None if row is None else row.witness_s
     s = witness or (None if cut is None else cut.s)
-    sentences = [] if row is None or state is None else [_how_it_failed(pair, state, row, failed)]
+    q = None if s is None else scene.to_q(s).tolist()
+    at = None if q is None else in_words(scene, q)
+    sentences = [] if row is None or state is None else [_how_it_failed(pair, state, row, failed, at if witness else None)]
     if cut is not None:
-        sentences += _what_was_cut(pair, cut, where=witness is None and cut.s is not None)
+        more, names = _what_was_cut(pair, cut, at if witness is None else None), called(pair.a, pair.b)
+        # Nobody reads the two names twice.
+        short = bool(sentences) and condition_named(pair.a, pair.b) is None
+        sentences += [f"They{text.removeprefix(names)}" if short and text.startswith(names) else text for text in more]
+    text = " ".join(sentences)
     return Held(
         pair=index,
         a=pair.a,
         b=pair.b,
-        text=" ".join(sentences),
-        q=None if s is None else scene.to_q(s).tolist(),
+        text=text,
+        q=q,
         faces=None if cut is None else cut.faces,
         lost=None if cut is None else cut.lost,
+        at=at if at and at in text else None,
     )
 
 
-def _how_it_failed(pair: Pair, state: PairState, row: PairRow, failed: Sequence[PairRow]) -> str:
-    names = called(pair.a, pair.b)
+def _how_it_failed(pair: Pair, state: PairState, row: PairRow, failed: Sequence[PairRow], at: str | None) -> str:
+    """Says how a pair failed, and where, if ``at`` names a configuration."""
+    names, there = called(pair.a, pair.b), f" at {at}" if at else ""
     detail = f": {row.detail}" if row.detail else ""
     match state:
         case PairState.REFUTED:
-            return f"{fails(pair.a, pair.b)} at the configuration named, which is proved."
+            return f"{fails(pair.a, pair.b)}{there}, which is proved."
         case PairState.NOT_CERTIFIABLE:
             return f"It is proved that no certificate of the form of the program (11) exists for {names}; cells may certify them."
         case PairState.TOO_CLOSE:
-            return f"{fails(pair.a, pair.b, 'come too close')}{detail}, as floating point says."
+            return f"{fails(pair.a, pair.b, 'come too close')}{there}{detail}, as floating point says."
         case PairState.ERROR:
             return f"{names} could not be certified{detail}."
         case _:
             cells = sum(part.open_cells or 0 for part in failed)
-            some = f": {'1 cell is' if cells == 1 else f'{cells} cells are'} open in all" if len(failed) > 1 and cells else detail
+            some = (
+                f": {'1 cell is' if cells == 1 else f'{cells} cells are'} open in {len(failed)} parts"
+                if len(failed) > 1 and cells
+                else detail
+            )
             return f"{names} are not certified{some}."
 
 
-def _what_was_cut(pair: Pair, cut: growth.Obstacle, *, where: bool) -> list[str]:
-    """Says what was cut off for a pair, and, if ``where``, how the pair failed at the configuration named."""
+def _what_was_cut(pair: Pair, cut: growth.Obstacle, at: str | None) -> list[str]:
+    """Says what was cut off for a pair, and how the pair failed, if ``at`` names the configuration."""
     sentences = []
-    if where and cut.contact:
-        sentences.append(f"{fails(pair.a, pair.b)} at the configuration named, as floating point says.")
-    elif where:
+    if at and cut.contact:
+        sentences.append(f"{fails(pair.a, pair.b)} at {at}, as floating point says.")
+    elif at:
         apart = "" if condition_named(pair.a, pair.b) else " apart"
-        sentences.append(f"{called(pair.a, pair.b)} could not be proved{apart} near the configuration named.")
+        sentences.append(f"{called(pair.a, pair.b)} could not be proved{apart} near {at}.")
     if cut.faces is None or cut.lost is None:
         return [*sentences, f"Something was cut off for {called(pair.a, pair.b)} {_times(cut.times)}."]
     faces = "1 face was" if cut.faces == 1 else f"{cut.faces} faces were"
-    return [*sentences, f"{faces} added or moved in for this pair, and cut off {100 * cut.lost:.2g} % of the polytope, as samples say."]
+    lost = f"{100 * cut.lost:.2g} %" if cut.lost >= SEEN else "less than 0.01 %"
+    return [*sentences, f"{faces} added or moved in for this pair, and cut off {lost} of the polytope, as samples say."]
 
 
 def _times(count: int) -> str:

@@ -78,6 +78,7 @@ class Obstacle(BaseModel):
     q: list[float] | None = Field(
         description="Joint positions at which the bodies touch, come too close, or could not be proved apart; null where none is known."
     )
+    at: str | None = Field(description="The words of `text` that name `q`, in degrees and metres; null where the text does not name it.")
     faces: int | None = Field(
         description="Number of faces of the polytope that were added or moved in for this pair; null where that is not known."
     )
@@ -98,9 +99,10 @@ class Obstacles(BaseModel):
                             "pair": 2,
                             "a": "arm/link2/box",
                             "b": "world/post",
-                            "text": "arm/link2/box and world/post touch at the configuration named, as floating point says. 2 faces were "
+                            "text": "arm/link2/box and world/post touch at q = (23.5, -11.5) deg, as floating point says. 2 faces were "
                             "added or moved in for this pair, and cut off 12 % of the polytope, as samples say.",
                             "q": [0.41, -0.2],
+                            "at": "q = (23.5, -11.5) deg",
                             "faces": 2,
                             "lost": 0.12,
                         }

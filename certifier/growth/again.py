@@ -64,7 +64,7 @@ def _contact(scene: Scene, polytope: Polytope, keep: Array) -> Finish | None:
         for s in keep[touching(kinematics, volumes, keep)]:
             outcome = Outcome.REFUTED if _is_witness(scene, pair, polytope, s) else Outcome.TOO_CLOSE
             how = "touch" if outcome is Outcome.REFUTED else "come too close"
-            return Finish(outcome, f"{REVOKED}{fails(pair.a, pair.b, how)} at {in_words(scene, s)}, which has to stay inside")
+            return Finish(outcome, f"{REVOKED}{fails(pair.a, pair.b, how)} at {in_words(scene, scene.to_q(s))}, which has to stay inside")
     return None
 
 

@@ -53,5 +53,5 @@ def refusal(reason: str, late: bool) -> CirisError:
         return CirisError("not_grown", reason, hint=f"allow more time, or {mend(reason)}" if late else mend(reason))
     look = "look at the pair named"
     if not late:
-        return CirisError("not_grown", reason, hint=f"try another seed, or {look}")
+        return CirisError("not_grown", reason, hint="try another seed" if reason == THIN else f"try another seed, or {look}")
     return CirisError("not_grown", reason, hint="allow more time" if reason == DEADLINE else f"allow more time, or {look}")

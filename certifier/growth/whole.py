@@ -96,9 +96,18 @@ def begin_stage(scene: Scene, state: GrowthState, polytope: Polytope, kept: floa
     return _next(scene, replace(state, whole=begun))
 
 
-def in_words(scene: Scene, s: Array) -> str:
-    """Returns a configuration as people read it."""
-    return f"q = ({', '.join(f'{x:.4g}' for x in scene.to_q(s))})"
+def in_words(scene: Scene, q: Sequence[float] | Array) -> str:
+    """Returns a configuration, (n,), as people read it, in degrees and metres: ``q = (23.5, -11.5) deg``."""
+    units = [joint.shown for joint in scene.moving]
+    texts = [
+        f"{round(scale * x, digits) + 0.0:.{digits}f}"
+        for x, (unit, scale) in zip(q, units, strict=True)
+        for digits in [1 if unit == "deg" else 3]
+    ]
+    kinds = {unit for unit, _ in units}
+    if len(kinds) > 1:
+        return f"q = ({', '.join(f'{text} {unit}' for text, (unit, _) in zip(texts, units, strict=True))})"
+    return f"q = ({', '.join(texts)}) {kinds.pop()}"
 
 
 def _kept(scene: Scene, start: Start, polytope: Polytope) -> float:

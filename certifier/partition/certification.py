@@ -226,7 +226,7 @@ class CellCertification:
             return self._refuted(search, volumes, report.contacts[0], result)
         if report.narrow:
             s, distance = self._nearest(search, np.concatenate(report.narrow))
-            detail = f"the padded bodies are {distance:.3g} m apart at the configuration named, too close for a plane"
+            detail = f"the padded bodies are {1000 * distance:.3g} mm apart, too close for a plane"
             return replace(result, outcome=Outcome.TOO_CLOSE, witness_s=s, detail=detail)
         if not count:
             return replace(result, detail="no cell is open; the cells are yet to be put together and verified")

@@ -290,8 +290,9 @@ def test_pairs_that_hold_a_region_back_come_worst_first(database: Database, job:
     save(database, begin(database, job, 0, {0: 1, 1: 1}), {(0, 0): left(outline(OPEN), 1), (1, 0): replace(touching, detail="")})
     found = ask(f"jobs/{job.id}/obstacles")["obstacles"]
     assert [one["pair"] for one in found] == [1, 0]
-    assert found[0]["text"] == "model/cart/ball and world/post1 touch at the configuration named, which is proved."
-    assert found[0]["q"] == [0.25]
+    assert found[0]["text"] == "model/cart/ball and world/post1 touch at q = (0.250) m, which is proved."
+    assert (found[0]["q"], found[0]["at"]) == ([0.25], "q = (0.250) m")
+    assert (found[1]["q"], found[1]["at"]) == (None, None)
     # While the next round runs, the one before is what is known; what it has certified is no obstacle any more.
     claim = begin(database, job, 1, {0: 1, 1: 1})
     assert [one["pair"] for one in ask(f"jobs/{job.id}/obstacles")["obstacles"]] == [1, 0]
@@ -342,7 +343,7 @@ def test_the_first_contact_of_a_motion_is_its_obstacle(
         steps.save(session, claim, StepState.DONE, {"outcome": outcome, "stop": stop}, 0.1)
     (found,) = ask(f"jobs/{job.id}/obstacles")["obstacles"]
     assert (found["pair"], found["q"]) == (1, [0.5])
-    said = f"model/cart/ball and world/post1 {how} at the configuration named, the first on the motion that could not be certified."
+    said = f"model/cart/ball and world/post1 {how} at q = (0.500) m, the first configuration on the motion that could not be certified."
     assert found["text"] == said
 
 

@@ -124,7 +124,7 @@ def test_a_job_says_what_cut_its_region(service: Any, region: str, database: Dat
     (found,) = job.obstacles()
     assert (found.pair, found.a, found.b, found.faces, found.lost) == (1, "model/cart/ball", "world/post1", 2, 0.125)
     assert found.q.tolist() == [0.25]
-    assert str(found).startswith("model/cart/ball and world/post1 could not be proved apart near the configuration named.")
+    assert str(found).startswith("model/cart/ball and world/post1 could not be proved apart near q = (0.250) m.")
 
 
 def test_answers_are_true_only_if_all_of_them_are_yes(service: Any, region: str) -> None:

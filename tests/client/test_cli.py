@@ -223,7 +223,7 @@ def test_a_polytope_is_certified_cell_by_cell(ciris: Ciris, files: Path) -> None
 
 @pytest.mark.usefixtures("parsed_once")
 def test_bodies_that_are_too_close_are_no_collision(ciris: Ciris, files: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    detail = "the padded bodies are 0.0001 m apart at the configuration named, too close for a plane"
+    detail = "the padded bodies are 0.1 mm apart, too close for a plane"
     near = PairResult(Outcome.TOO_CLOSE, Stage.CELLS, witness_s=np.zeros(2), detail=detail)
     monkeypatch.setattr(local, "certify", lambda *_: Verdict({0: near}, Guarantee.EXACT, 0.1))
     done = ciris("certify", PLANAR, "--polytope", "small.npz", "--local", "--cells", "300")

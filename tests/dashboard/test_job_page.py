@@ -232,7 +232,7 @@ def test_the_cells_of_a_drawing_are_those_that_are_open_and_proved(page: Any, ur
 def test_what_holds_the_region_back_is_said_and_drawn(page: Any, url: str, job_id: str) -> None:
     page.add_init_script(OBSERVE)
     page.goto(f"{url}/jobs/{job_id}")
-    page.get_by_text("model/cart/ball and world/post0 come too close: 0.001 m apart, as floating point says.").wait_for()
+    page.get_by_text("model/cart/ball and world/post0 come too close at q = (0.400 m): 0.001 m apart, as floating point says.").wait_for()
     page.get_by_text("world/post0 are painted").scroll_into_view_if_needed()
     robot = page.get_by_role("img", name=re.compile(r"^The robot at slide 0\.400 m"))
     robot.wait_for()
@@ -245,6 +245,26 @@ def test_what_holds_the_region_back_is_said_and_drawn(page: Any, url: str, job_i
     assert middle(page.context.browser, picture) == ink, "the place is marked, and in the middle of the view"
     page.get_by_role("link", name="Open the pair").click()
     page.get_by_role("heading", name="world/post0").wait_for()
+    about = page.locator(".pair .said")
+    assert about.all_text_contents() == [
+        "Too close in iteration 0; 2.0 s; 1 open cell.",
+        "model/cart/ball and world/post0 come too close at q = (0.400 m): 0.001 m apart, as floating point says.",
+    ], "nothing is read twice"
+    about.get_by_role("link", name="q = (0.400 m)").click()
+    page.wait_for_url(f"{url}/scenes/*?q=0.4*")
+    page.get_by_role("spinbutton", name="slide, metres, as a number").wait_for()
+    assert page.get_by_role("spinbutton", name="slide, metres, as a number").input_value() == "0.400"
+
+
+def test_what_holds_the_region_back_is_said_while_an_iteration_lasts(page: Any, url: str, database: Database, scene: Scene) -> None:
+    """A pair that has failed is no secret until the others of its iteration have ended."""
+    job_id = new_job(database, scene)
+    begin(database, scene, job_id)
+    page.goto(f"{url}/jobs/{job_id}")
+    page.get_by_text("Nothing is known to limit it.").wait_for()
+    settle(database, job_id, too_close(scene, 4), batch=0)
+    page.get_by_text("model/cart/ball and world/post0 come too close at").wait_for()
+    assert page.get_by_text("Nothing is known to limit it.").count() == 0
 
 
 def test_without_a_stream_the_page_asks_again(page: Any, url: str, database: Database, job_id: str) -> None:

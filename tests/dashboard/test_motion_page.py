@@ -42,7 +42,11 @@ def test_where_nothing_is_proved_the_motion_says_so(page: Any, url: str, planar:
     page.locator(".claim", has_text="After that, nothing is proved.").wait_for(timeout=60_000)
     page.get_by_label("Time, seconds").press("End")
     page.locator(".moment", has_text="where nothing is proved").wait_for()
-    page.get_by_text("touch at the configuration named").wait_for()
+    (stop,) = client.get(f"/v1/jobs/{job}/obstacles").json()["obstacles"]
+    words = ", ".join(f"{np.rad2deg(angle):.1f}\N{DEGREE SIGN}" for angle in stop["q"])
+    named = page.get_by_role("link", name=f"q = ({words})")
+    named.wait_for()
+    assert named.get_attribute("href") == f"/scenes/{planar.hash[:16]}?q={','.join(map(repr, stop['q']))}"
     assert "m apart" not in page.locator("main").text_content()
 
 

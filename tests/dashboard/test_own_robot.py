@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
@@ -174,6 +176,64 @@ def test_what_versions_before_certified_of_a_scene_without_pairs_is_not_called_p
     text = client.get(f"/jobs/{job.id}").text
     assert "No pair of bodies can collide in this scene: it has no two bodies that move against each other." in text
     assert "is covered" not in text
+
+
+BALL = '<collision><origin xyz="0.53 0.02 0.03"/><geometry><sphere radius="0.1"/></geometry></collision>'
+"""Where the tip is at q* = 0."""
+
+
+def joints(page: Any) -> list[float]:
+    """The joint positions that the form shows, in degrees."""
+    return [float(field.input_value()) for field in page.get_by_role("spinbutton", name=re.compile("as a number")).all()]
+
+
+def test_a_robot_that_collides_at_its_centre_begins_beside_it(
+    page: Any, url: str, client: TestClient, tmp_path: Path, barriers: Any
+) -> None:
+    """A region that is grown where bodies almost touch is thin, so there is room around where the robot begins."""
+    upload(
+        page,
+        url,
+        packed(tmp_path, arm___urdf=urdf("arm", "link.obj").replace("</collision>", f"</collision>{BALL}", 1), link___obj=TETRAHEDRON),
+    )
+    page.get_by_text("The robot began at a free configuration near it.").wait_for()
+    assert page.get_by_text("At q*, arm/base/").count() == 1
+    page.get_by_text("No collision (computed, not proved)").wait_for()
+    begun = np.deg2rad(joints(page))
+    around = [(begun + 0.05 * np.array(way)).tolist() for way in ((1, 0), (-1, 0), (0, 1), (0, -1))]
+    contacts = client.post("/v1/planning/contacts", json={"scene": "arm", "q": [[0.0, 0.0], begun.tolist(), *around]}).json()["contacts"]
+    assert [bool(one["pairs"]) for one in contacts] == [True, False, False, False, False, False]
+    assert np.abs(begun).max() < 1.2, "it is near"
+    assert barriers(page) == []
+    # Whoever asks for q* gets it.
+    page.get_by_role("button", name="Centre q*").click()
+    page.get_by_text("Not free: arm/base/").wait_for()
+    page.wait_for_timeout(1500)
+    assert joints(page) == [0.0, 0.0]
+    page.goto(f"{url}/new?scene=arm&q=0,0")
+    page.get_by_text("Not free: arm/base/").wait_for()
+    page.wait_for_timeout(1500)
+    assert joints(page) == [0.0, 0.0]
+
+
+def test_a_robot_that_is_moved_while_a_free_configuration_is_looked_for_stays_where_it_is(page: Any, url: str, tmp_path: Path) -> None:
+    held: list[Any] = []
+    page.route("**/v1/planning/plan", lambda route: held.append(route))
+    upload(
+        page,
+        url,
+        packed(tmp_path, arm___urdf=urdf("arm", "link.obj").replace("</collision>", f"</collision>{BALL}", 1), link___obj=TETRAHEDRON),
+    )
+    page.get_by_text("Looking for a free configuration").wait_for()
+    field = page.get_by_role("spinbutton", name="pan, degrees, as a number")
+    field.fill("3")
+    field.press("Enter")
+    page.get_by_text("Not free: arm/base/").wait_for()
+    held[0].continue_()
+    page.get_by_text("Looking for a free configuration").wait_for(state="detached")
+    page.wait_for_timeout(500)
+    assert joints(page) == [3.0, 0.0]
+    assert page.get_by_text("The robot began").count() == 0
 
 
 @pytest.mark.usefixtures("confining")

@@ -57,17 +57,13 @@ export function JobIsland({ job, kind, subject, scene, ended, begun, units }: { 
         </p>
       )}
       {route.pair !== null ? (
-        <Pair store={store} version={version} robot={robot} route={{ ...route, pair: route.pair }} />
+        <Pair store={store} version={version} robot={robot} scene={scene} route={{ ...route, pair: route.pair }} />
       ) : (
         <>
           {store.iterations.length > 0 && <Matrix store={store} version={version} memory={memory} />}
           {store.ended && subject === "the motion" && <Moved job={job} scene={scene} />}
           <Growth job={job} measure={store.measure} points={store.reached} />
-          <Obstacles
-            obstacles={store.obstacles}
-            robot={robot}
-            whom={subject}
-          />
+          <Obstacles obstacles={store.obstacles} robot={robot} whom={subject} scene={scene} units={units} />
           {!store.ended && <Workers store={store} subject={subject} />}
           <Timeline store={store} subject={subject} />
           <Log store={store} subject={subject} />

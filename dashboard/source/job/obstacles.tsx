@@ -1,6 +1,7 @@
 // What limits the region, in words, and the configuration in contact in 3D.
 import { useState } from "preact/hooks";
 import type { Obstacle } from "../common/schema";
+import { shown, type Unit } from "../common/units";
 import { Contact } from "./contact";
 import { plural } from "./outcomes";
 import { address } from "./route";
@@ -8,7 +9,28 @@ import type { Drawable } from "./store";
 
 const AT_FIRST = 5;
 
-export function Obstacles({ obstacles, robot, whom }: { obstacles: Obstacle[] | null; robot: Drawable; whom: string }) {
+/** What stands in the way, in words. The configuration in them leads to the page of the scene, where the robot stands there. */
+export function Said({ about: { text, at, q }, scene, units }: { about: Obstacle; scene: string; units: Unit[] }) {
+  if (!at || !q) return <>{text}</>;
+  const [before, after] = text.split(at);
+  return (
+    <>
+      {before}
+      <a href={`/scenes/${scene}?q=${q.join(",")}`} title="The robot at this configuration">q = ({q.map((value, i) => shown(value, units[i]!)).join(", ")})</a>
+      {after}
+    </>
+  );
+}
+
+interface Props {
+  obstacles: Obstacle[] | null;
+  robot: Drawable;
+  whom: string;
+  scene: string;
+  units: Unit[];
+}
+
+export function Obstacles({ obstacles, robot, whom, scene, units }: Props) {
   const [all, setAll] = useState(false);
   const [chosen, setChosen] = useState<string | null>(null);
   if (obstacles === null) return null;
@@ -27,7 +49,7 @@ export function Obstacles({ obstacles, robot, whom }: { obstacles: Obstacle[] | 
             <ol class="obstacles">
               {inView.map((one) => (
                 <li key={key(one)} class={one === drawn ? "chosen" : ""}>
-                  <p>{one.text}</p>
+                  <p><Said about={one} scene={scene} units={units} /></p>
                   <p class="links">
                     {one.q && (
                       <button type="button" class="plain" aria-pressed={one === drawn} onClick={() => setChosen(key(one))}>

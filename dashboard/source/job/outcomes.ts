@@ -62,7 +62,8 @@ export function facts(letter: string, iteration: IterationStates, cell: PairCell
   if (cell.seconds !== null) found.push(duration(cell.seconds));
   if (cell.proved_distance !== null) found.push(`at least ${atLeast(cell.proved_distance)} apart`);
   if (cell.parts > 1) found.push(`in ${cell.parts} parts`);
-  if (cell.open_cells) found.push(plural(cell.open_cells, "open cell"));
+  // Of parts that have not ended, nothing is counted.
+  if (cell.open_cells) found.push(`${plural(cell.open_cells, "open cell")}${cell.parts > 1 && "wos".includes(letter) ? " in those that have ended" : ""}`);
   if (cell.worker && letter === "w") found.push(`on ${cell.worker}`);
   if (cell.witness_q)
     found.push(`${letter === "r" ? "in collision" : "nearest"} at q = ${cell.witness_q.map((value, i) => shown(value, units[i]!)).join(", ")}`);

@@ -5,6 +5,7 @@ import { ofCondition, positions } from "../common/kinematics";
 import { Cells } from "../common/partition";
 import type { Partition } from "../common/schema";
 import { Contact } from "./contact";
+import { Said } from "./obstacles";
 import { OUTCOMES, facts } from "./outcomes";
 import { address, go, type Route } from "./route";
 import type { JobStore, Drawable } from "./store";
@@ -13,10 +14,11 @@ interface Props {
   store: JobStore;
   version: number;
   robot: Drawable;
+  scene: string;
   route: Route & { pair: number };
 }
 
-export function Pair({ store, version, robot, route }: Props) {
+export function Pair({ store, version, robot, scene, route }: Props) {
   const heading = useRef<HTMLHeadingElement>(null);
   const [partition, setPartition] = useState<Partition | null>(null);
   const [problem, setProblem] = useState<{ text: string; again: boolean } | null>(null);
@@ -62,6 +64,8 @@ export function Pair({ store, version, robot, route }: Props) {
   const here = { pair: route.pair, iteration: route.iteration };
   const about = store.obstacles?.find((one) => one.pair === route.pair);
   const where = cell?.witness_q ?? (letter === "c" || letter === "u" ? null : about?.q);
+  // What stands below the robot, or in the sentences about the pair, is not said twice.
+  const rest = cell && { ...cell, witness_q: where ? null : cell.witness_q, detail: cell.detail && about?.text.includes(cell.detail) ? null : cell.detail };
   return (
     <section aria-labelledby="h-pair" class="pair">
       <p class="path">
@@ -77,8 +81,8 @@ export function Pair({ store, version, robot, route }: Props) {
       <div class={where ? "stage" : ""}>
         {where && <Contact pair={route.pair} a={pair.a} b={pair.b} q={where} robot={robot} />}
         <div>
-          {iteration && <p class="said">{sentence(facts(letter, iteration, cell, store.units).join("; "))}.</p>}
-          {about && <p class="said">{about.text}</p>}
+          {iteration && <p class="said">{sentence(facts(letter, iteration, rest, store.units).join("; "))}.</p>}
+          {about && <p class="said"><Said about={about} scene={scene} units={store.units} /></p>}
         </div>
       </div>
       {problem &&

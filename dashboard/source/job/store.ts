@@ -167,8 +167,7 @@ export class JobStore {
     this.stop();
     void this.head();
     this.syncSoon();
-    this.slowSoon();
-    this.told();
+    void this.attempt(() => this.around());
   }
 
   private take(event: Event): void {
@@ -182,7 +181,7 @@ export class JobStore {
     }
     this.syncSoon();
     this.headSoon();
-    if (event.kind !== "pairs" && event.kind !== "note") this.slowSoon();
+    if (event.kind !== "note") this.slowSoon();
   }
 
   /** Brings what the events have named up to date. */

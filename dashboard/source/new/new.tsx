@@ -1,16 +1,17 @@
 // The form that starts a job: a scene, a configuration that the robot shows, and what shall be done.
-import { useEffect, useMemo, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { get, post, said, ServiceError } from "../common/api";
 import { positions } from "../common/kinematics";
 import { MomentText, touchingOf, useMoment } from "../common/moment";
 import { Robot } from "../common/drawn";
-import type { ContactsResponse, Job, PlanResponse, SceneDetail, SceneModel, ScenePage } from "../common/schema";
+import type { ContactsResponse, Job, SceneDetail, SceneModel, ScenePage } from "../common/schema";
 import { Sliders } from "../common/sliders";
 import { ChooseScene, named, type Scene } from "./choose";
 import type { Refused } from "./options";
 import { asked, stated, type Start as First } from "./again";
 import { blocked, useBlocked } from "./blocked";
 import { JobCopies } from "./copies";
+import { nearby } from "./nearby";
 import { isMarked, missing, request, type Parts, type Wish } from "./request";
 import { Wishes } from "./wishes";
 import { readQ, useAddress, within, written } from "../common/address";
@@ -89,6 +90,11 @@ function Start({ given, model, parts, first }: Props & { given: string; model: S
   const [refused, setRefused] = useState<Refused | null>(null);
   const [sending, setSending] = useState(false);
   const [looking, setLooking] = useState(false);
+  /** What is wrong with q*, if the robot was moved away from it. */
+  const [left, setLeft] = useState<string | null>(null);
+  const latest = useRef(q);
+  latest.current = q;
+  const untouched = useRef(first.q === null ? q : null);
   const [configurations, setConfigurations] = useState<SceneDetail["configurations"]>({});
   const moment = useMoment(model.scene, q);
   const touching = useMemo(() => touchingOf(model, moment), [model, moment]);
@@ -111,7 +117,7 @@ function Start({ given, model, parts, first }: Props & { given: string; model: S
     setProblem(null);
   };
   /** Looks for another configuration, and says so meanwhile. */
-  const look = async (search: () => Promise<void>): Promise<void> => {
+  const look = async (search: () => Promise<unknown>): Promise<void> => {
     setLooking(true);
     setProblem(null);
     try {
@@ -128,11 +134,22 @@ function Start({ given, model, parts, first }: Props & { given: string; model: S
     if (free < 0) setProblem(`None of ${TRIES} random configurations is free.`);
     else setQ(drawn[free]!);
   };
-  const moveNear = async (): Promise<void> => {
-    const { collision } = await post<PlanResponse>("/v1/planning/plan", { scene: model.scene, start: q, goal: q });
-    if (collision?.free) setQ(collision.free);
-    else if (collision) setProblem("No free configuration was found near by.");
+  /** Moves the robot to a free configuration near by, unless somebody moves it meanwhile, and says whether it did. */
+  const moveNear = async (): Promise<boolean> => {
+    const free = await nearby(model, q);
+    if (latest.current !== q) return false;
+    if (free) setQ(free);
+    else if (free === null) setProblem("No free configuration was found near by.");
+    return Boolean(free);
   };
+  // Nobody has asked for q*. Where it is not free, the robot begins beside it.
+  useEffect(() => {
+    if (moment.trouble.length === 0 || untouched.current !== q) return;
+    untouched.current = null;
+    void look(async () => {
+      if (await moveNear()) setLeft(moment.trouble[0]!);
+    });
+  }, [moment]);
   const submit = async (event: Event): Promise<void> => {
     event.preventDefault();
     const lacking = missing(wish);
@@ -168,6 +185,7 @@ function Start({ given, model, parts, first }: Props & { given: string; model: S
       <div>
         <Robot model={model} q={q} onDrag={setQ} touching={touching} label={`The robot of ${model.name}${touching.length ? ", not free" : ""}`} />
         <MomentText moment={moment} />
+        {left && <p class="notice">At q*, {left}. The robot began at a free configuration near it.</p>}
         {unread && <p class="notice">{first.by} does not name a configuration within the limits: {first.q}. The robot stands at the nearest one, or at q*.</p>}
         <div class="card">
           <Sliders names={names} units={model.units} lower={model.q_lower} upper={model.q_upper} q={q} onChange={setQ} />

@@ -29,6 +29,7 @@ def test_a_polytope_that_users_did_not_give_is_not_spoken_of(ends) -> None:
     said = ended_by(error.value, "")
     assert (said.code, said.message, said.field) == ("not_grown", THIN, None)
     assert "polytope" not in f"{said} {said.hint}"
+    assert said.hint == "try another seed", "no pair is named"
 
 
 def test_other_errors_stay_as_they_are() -> None:

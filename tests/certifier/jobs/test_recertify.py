@@ -141,7 +141,7 @@ def test_an_obstacle_on_the_seed_revokes_the_region_in_words():
     with pytest.raises(CirisError) as caught:
         recertify(on_seed, region().proof, SEED)
     assert caught.value.code == "revoked"
-    assert "arm/link1/bar and world/post touch at q = (0, 0)" in caught.value.message
+    assert "arm/link1/bar and world/post touch at q = (0.0, 0.0) deg" in caught.value.message
 
 
 def test_a_thicker_padding_is_proved_again_and_nothing_is_carried_over():

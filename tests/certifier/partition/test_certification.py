@@ -191,7 +191,7 @@ def test_bodies_that_nearly_touch_are_too_close_and_the_distance_is_the_one_ther
     assert polytope.contains(result.witness_s)
     apart = distance(scene, 0, result.witness_s)
     assert 0 < apart < 0.01
-    assert f"are {apart:.3g} m apart" in result.detail
+    assert f"are {1000 * apart:.3g} mm apart" in result.detail
     for radius, check in ((0.08, check_certified), (0.084, check_refuted)):
         other, _ = passing(0.6, replace(TIP, radius=radius))
         check(other, polytope, 0, certify(other, polytope))
