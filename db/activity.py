@@ -51,7 +51,9 @@ def of_jobs(session: Session, rows: Sequence[JobRow], kept: Kept | None = None) 
     alive = [row for row in rows if row.state in (JobState.QUEUED, JobState.RUNNING)]
     if not alive:
         return found
-    children = session.scalars(select(JobRow).where(JobRow.parent_id.in_(_ids(alive)), JobRow.state.in_(unfinished(JOB)))).all()
+    parents = [row.id for row in alive if row.pieces is None]  # what has pairs of its own has no jobs below it
+    found_below = select(JobRow).where(JobRow.parent_id.in_(parents), JobRow.state.in_(unfinished(JOB)))
+    children = session.scalars(found_below).all() if parents else ()
     below = of_jobs(session, children, kept) if children else {}
     held, waiting = _held(session, alive)
     nobody = not held and all(row.coordinator is None for row in alive)

@@ -6,8 +6,8 @@ the group of such a pair. A pair that was skipped is not.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from typing import cast
+from collections.abc import Collection, Iterable, Sequence
+from typing import NamedTuple, cast
 
 from sqlalchemy import ColumnElement, func, select, tuple_
 from sqlalchemy.orm import Session
@@ -20,8 +20,24 @@ _KEYS = {"sqlite": "json_each", "postgresql": "json_object_keys"}
 """The database's function that lists what an object of JSON has."""
 
 
-def of_jobs(session: Session, rows: Sequence[JobRow]) -> dict[str, tuple[int, int]]:
-    """Returns (settled pairs, pairs) of the last iteration of these jobs, by the job's id; nothing of a job without iterations."""
+class Version(NamedTuple):
+    """Says which state of a job its progress is that of: every move of a pair changes the counts, and every iteration the turn."""
+
+    job_id: str
+    turn: int
+    event_seq: int
+    pieces: int | None
+    open_pairs: int
+    running_pairs: int
+
+
+def version(row: JobRow) -> Version:
+    """Returns what changes whenever the progress of the job does."""
+    return Version(row.id, row.turn, row.event_seq, row.pieces, row.open_pairs, row.running_pairs)
+
+
+def of_jobs(session: Session, rows: Iterable[JobRow]) -> dict[Version, tuple[int, int]]:
+    """Returns (settled pairs, pairs) of the last iteration of these jobs; nothing of a job without iterations."""
     known = {row.id: row for row in rows if row.pieces is not None}
     if not known:
         return {}
@@ -49,7 +65,7 @@ def of_jobs(session: Session, rows: Sequence[JobRow]) -> dict[str, tuple[int, in
         unsettled = sum(1 + groups.get(pair, 0) for pair in left.get(job_id, ()))
         if job_id in counted:
             unsettled += row.open_pairs + row.running_pairs
-        found[job_id] = total - unsettled, total
+        found[version(row)] = total - unsettled, total
     return found
 
 

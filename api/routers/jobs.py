@@ -22,6 +22,7 @@ from api.access import READ, SUBMIT, Admin, Db, Submitter
 from api.announce import Announce
 from api.delivery import unchanging
 from api.reading import ReadingRoute
+from api.remembered import Remembered
 from api.room import KeptRoom
 from api.schemas.common import MAX_INT, Cursor, JobGiven, OfIteration, OfScene, PairGiven, WithDependents
 from api.schemas.jobs import (
@@ -65,6 +66,8 @@ MOST_PAIRS = 5000
 """One page of a pair matrix has at most this many results."""
 KEPT_SECONDS = 1.0
 """Which workers there are, and which jobs wait, is kept for this time."""
+_progress = Remembered[progress.Version, tuple[int, int]](2000)
+_labels = Remembered[str, dict[str, str]](2000)
 
 IdempotencyKey = Annotated[str | None, Header(min_length=1, max_length=200, description="The same key and body give the same job.")]
 Label = Annotated[
@@ -165,11 +168,13 @@ def cancel_jobs(body: CancelRequest, db: Db, announce: Announce) -> JobList:
 
 def described(db: Database, rows: Sequence[JobRow]) -> list[Job]:
     """Describes jobs: with what they do now, how far they are, their labels and the shares of their last regions."""
+    versions = {progress.version(row): row for row in rows}
     with db.read() as session:
-        does, settled = activity.of_jobs(session, rows, _kept(db.reader)), progress.of_jobs(session, rows)
+        does = activity.of_jobs(session, rows, _kept(db.reader))
+        settled = _progress.of(versions, lambda new: progress.of_jobs(session, map(versions.__getitem__, new)))
         shares = regions.shares(session, [row.region_id for row in rows if row.region_id is not None])
-        known = labels.of_jobs(session, [row.id for row in rows])
-    return [Job.of(row, does[row.id], settled.get(row.id), shares.get(row.region_id or ""), known.get(row.id, {})) for row in rows]
+        known = _labels.of([row.id for row in rows], lambda new: labels.of_jobs(session, new))
+    return [Job.of(row, does[row.id], settled[progress.version(row)], shares.get(row.region_id or ""), known[row.id] or {}) for row in rows]
 
 
 @cached(TTLCache(maxsize=4, ttl=KEPT_SECONDS), lock=Lock())
