@@ -63,8 +63,8 @@ log = logging.getLogger(__name__)
 DESCRIPTION = """Certified collision-free regions of robot configuration space.
 
 You upload a scene and start a job that grows or certifies a polytope. You get certified regions with proofs that anyone can check
-offline. Errors are problem+json (RFC 9457) with a `code`, the `field` and a `hint`. The service refuses unknown fields and numbers that
-are not finite."""
+offline. Errors are problem+json (RFC 9457) with a `code`, the `field` and a `hint`. The service refuses unknown fields, numbers that
+are not finite, and bodies with more than 200 000 values."""
 
 
 THREADS = CONNECTIONS - AT_ONCE - READERS - WRITERS - SMALL - LARGE - 3
@@ -86,6 +86,7 @@ def create_app(db: Database | None = None) -> FastAPI:
         separate_input_output_schemas=False,
         lifespan=_lifespan,
         telemetry={"metrics": False, "logs": False, "operation_spans": False, "exclude": _untraced},
+        form_limits={"max_files": 1, "max_fields": 2},
         routes=_routes(),
     )
     app.state.database = db or database()

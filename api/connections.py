@@ -22,6 +22,8 @@ from certifier.errors import CirisError
 
 HEAD_SECONDS = 30.0
 """The first line and the headers of a request must arrive within this many seconds from its first byte, or from the connection's start."""
+HEAD_BYTES = 64 * 2**10
+"""The first line and the headers of a request have at most about this many bytes."""
 BODY_SECONDS, BODY_RATE = 30.0, 4096
 """A body may take BODY_SECONDS, and one second more for each BODY_RATE of its bytes."""
 ANSWER_SECONDS, ANSWER_RATE = 60.0, 1024
@@ -34,6 +36,7 @@ FILES = 2 * CONNECTIONS
 """Number of files that a process may need to hold open, for connections and everything else."""
 
 _LATE = CirisError("too_slow", "the request did not arrive in time", field="body", hint="send it faster, or in smaller parts")
+_LONG = CirisError("too_large", f"the address and headers have more than {HEAD_BYTES // 2**10} KiB", hint="send less")
 _FULL = CirisError("busy", "the service has as many connections as it can hold", hint="try again in a while")
 
 
@@ -56,6 +59,7 @@ class BoundedProtocol(HttpToolsProtocol):
         now = time.monotonic()
         self.waiting_since = now
         self._head_since: float | None = now
+        self._head_bytes = 0
         self._body_since: float | None = None
         self._said_something, self._body_bytes = False, 0
         self._left, self._taken_at = 0, now
@@ -73,9 +77,13 @@ class BoundedProtocol(HttpToolsProtocol):
 
     def data_received(self, data: bytes) -> None:
         if self._head_since is None and self._body_since is None:
-            self._head_since = time.monotonic()
+            self._head_since, self._head_bytes = time.monotonic(), 0
         self._said_something = True
         super().data_received(data)
+        if self._head_since is not None:
+            self._head_bytes += len(data)
+            if self._head_bytes > HEAD_BYTES and not self.transport.is_closing():
+                self._refuse(_LONG, HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE)
 
     def on_headers_complete(self) -> None:
         self.waiting_since, self._head_since = None, None

@@ -24,7 +24,7 @@ UPLOAD = "Body_create_scene"
 ANYWHERE = ("unknown_host", "too_many_requests", "internal")
 WITH_KEY = ("key_needed", "scope_missing", "database_unavailable")
 CHANGING = ("cross_site", "no_room")
-WITH_BODY = ("malformed_json", "invalid_request", "too_large", "content_encoding")
+WITH_BODY = ("malformed_json", "invalid_request", "too_large", "content_encoding", "busy")
 PLACES = {
     "scene_id": ("scene_not_found", "ambiguous_id"),
     "job_id": ("job_not_found", "ambiguous_id"),
@@ -43,9 +43,9 @@ ALSO: dict[str, tuple[str, ...]] = {
     "create_scene": ("bundle_too_large", "storage_quota", "scene_not_found", "scene_unchanged", *CHILDREN),
     "promote_scene": ("scene_not_found", "scene_without_regions", "busy"),
     "delete_scene": ("has_dependents", "not_ended", "busy"),
-    "create_job": ("idempotency_conflict", "quota_exceeded", "storage_quota", "time_quota", "region_not_found", "busy"),
-    "create_jobs": ("scene_not_found", "region_not_found", "idempotency_conflict", "quota_exceeded", "storage_quota", "time_quota", "busy"),
-    "cancel_jobs": ("job_not_found", "ambiguous_id", "busy"),
+    "create_job": ("idempotency_conflict", "quota_exceeded", "storage_quota", "time_quota", "region_not_found"),
+    "create_jobs": ("scene_not_found", "region_not_found", "idempotency_conflict", "quota_exceeded", "storage_quota", "time_quota"),
+    "cancel_jobs": ("job_not_found", "ambiguous_id"),
     "delete_job": ("has_dependents", "not_ended", "busy"),
     "cancel_job": ("busy",),
     "stream_job_events": ("busy",),
@@ -69,21 +69,17 @@ ALSO: dict[str, tuple[str, ...]] = {
     "verify_region": ("proof_not_found", *CHILDREN),
     "export_region": ("bad_name",),
     "delete_region": ("busy",),
-    "contains": ("busy",),
-    "find_nearest": ("busy",),
-    "cover_segments": ("busy",),
-    "cover_path": ("busy",),
     "download_kept_proof": ("motion_not_found", "ambiguous_id", "proof_not_found"),
     "plan_trajectory": ("region_elsewhere", "region_not_found", *CHILDREN),
     "slice_space": CHILDREN,
     "certify_path": CHILDREN,
     "get_graph": CHILDREN,
-    "create_key": ("first_key", "key_name", "too_many_keys", "other_projects", "project_not_found", "busy"),
+    "create_key": ("first_key", "key_name", "too_many_keys", "other_projects", "project_not_found"),
     "revoke_key": ("key_not_found", "busy"),
     "list_projects": ("other_projects",),
-    "create_project": ("other_projects", "project_name", "busy"),
+    "create_project": ("other_projects", "project_name"),
     "get_any_project": ("other_projects", "project_not_found"),
-    "set_limits": ("other_projects", "project_not_found", "busy"),
+    "set_limits": ("other_projects", "project_not_found"),
     "get_inventory": ("other_projects",),
     "pause_worker": ("worker_draining", "workers_shared", "busy"),
     "resume_worker": ("worker_draining", "workers_shared", "busy"),

@@ -9,7 +9,9 @@ is sent across sites. A caller without a key is refused before the body of the r
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from http import HTTPStatus
 from ipaddress import ip_address, ip_network
 
@@ -19,7 +21,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from api.access import Keyring, presented
+from api.access import Caller, Keyring, presented
 from api.limits import Buckets
 from api.oidc import CALLBACK
 from certifier.errors import CirisError
@@ -29,6 +31,9 @@ BODY_BYTES = 16 * 2**20
 """The largest body of a request, in bytes, for every route but uploads. The largest valid request is smaller."""
 UPLOAD_BYTES = 64 * 2**20
 UPLOADS = "/v1/scenes"
+HELD_BYTES = 4 * BODY_BYTES
+"""The bodies of a project's requests that are read and answered at the same time have at most this many bytes. Uploads lie on the disk."""
+URL_BYTES = 32 * 2**10
 HEALTH = frozenset({"/healthz", "/readyz"})
 PUBLIC = HEALTH | {"/login", "/login/oidc", CALLBACK, "/login/project", "/logout"}
 SAME_SITE = frozenset({"same-origin", "none"})
@@ -72,13 +77,16 @@ class Guard:
     ) -> None:
         self._app, self._keyring, self._hosts, self._respond = app, keyring, hosts, respond
         self._keys, self._addresses, self._sign_ins = Buckets(rate), Buckets(rate), Buckets(SIGN_INS_PER_SECOND)
+        self._held = Counter[str | None]()
+        """Maps a project to the number of bytes of the bodies that are held for it."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
         headers = Headers(scope=scope)
-        limit = UPLOAD_BYTES if scope["path"] == UPLOADS else BODY_BYTES
+        upload = scope["path"] == UPLOADS
+        limit = UPLOAD_BYTES if upload else BODY_BYTES
         try:
             _check_url(scope)
             self._check_origin(scope["method"], headers)
@@ -88,7 +96,11 @@ class Guard:
         except (CirisError, *UNAVAILABLE) as error:
             await self._respond(Request(scope), error)(scope, receive, send)
             return
-        await self._app(scope, _counted(receive, limit), send)
+        caller: Caller | None = scope.get("state", {}).get("caller")
+        project = None if caller is None else caller.project
+        counted = _counted(receive, limit)
+        with nullcontext(counted) if upload else _held(counted, self._held, project) as body:
+            await self._app(scope, body, send)
 
     def _check_origin(self, method: str, headers: Headers) -> None:
         host = headers.get("host", "")
@@ -106,9 +118,9 @@ class Guard:
         """Finds out who asks (``request.state.caller``), except on public paths, and counts the request.
 
         A caller with a valid key, or who has signed in, is counted by the key or the person, wherever the caller is. So others behind the
-        same address cannot use up the caller's requests. Everybody else is counted by address, before the guard does anything else for
-        them; so is the first request
-        of a key in this process. Health checks are not counted: who shares an address with them must not have the service ended.
+        same address cannot use up the caller's requests. Everybody else is counted by
+        address, before the guard does anything else for them; so is the first request of a key in this process. Health checks are not
+        counted: who shares an address with them must not have the service ended.
         """
         if scope["path"] in HEALTH:
             return
@@ -148,7 +160,10 @@ def _name(host: str) -> str:
 
 
 def _check_url(scope: Scope) -> None:
-    """Refuses a zero byte in the path or the query: no database can look it up."""
+    """Refuses an address that is longer than any that is asked for, and a zero byte in it: no database can look it up."""
+    if len(scope["path"]) + len(scope["query_string"]) > URL_BYTES:
+        problem = f"the address has more than {URL_BYTES // 2**10} KiB"
+        raise CirisError("too_large", problem, field="url", hint="ask for less at a time")
     if "\0" in scope["path"] or b"%00" in scope["query_string"]:
         raise CirisError("invalid_request", "the address holds a zero byte", field="url", hint="leave it out")
 
@@ -187,3 +202,32 @@ def _counted(receive: Receive, limit: int) -> Receive:
         return message
 
     return counted
+
+
+@contextmanager
+def _held(receive: Receive, held: Counter[str | None], project: str | None) -> Iterator[Receive]:
+    """Makes a ``receive`` that stops, with an HTTPException, when too much is held for the project. Nothing of it is held afterwards.
+
+    Args:
+        held: maps a project to the number of bytes of the bodies that are held for it.
+    """
+    received = 0
+
+    async def counted() -> Message:
+        nonlocal received
+        message = await receive()
+        size = len(message.get("body", b""))
+        received += size
+        held[project] += size
+        if held[project] > HELD_BYTES:
+            problem = f"requests with {HELD_BYTES // 2**20} MiB are being answered already"
+            hint = "send fewer at a time"
+            raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE) from CirisError("busy", problem, field="body", hint=hint)
+        return message
+
+    try:
+        yield counted
+    finally:
+        held[project] -= received
+        if not held[project]:
+            del held[project]

@@ -72,6 +72,8 @@ _STATUS_OF_CODE = {
 
 RETRY_SECONDS = 5
 
+MOST_ERRORS = 100
+
 OF_THE_FRAMEWORK = {
     HTTPStatus.NOT_FOUND: "not_found",
     HTTPStatus.METHOD_NOT_ALLOWED: "method_not_allowed",
@@ -118,7 +120,7 @@ class Problem(BaseModel):
     code: str = Field(description="What is wrong, for programs. Codes are stable.")
     field: str | None = Field(None, description="Where it is wrong: a field, a header or `url`; null where the whole request is meant.")
     hint: str = Field("", description="What to do about it.")
-    errors: list[FieldProblem] = Field([], description="All fields that are wrong, where there are several.")
+    errors: list[FieldProblem] = Field([], description=f"The fields that are wrong, at most {MOST_ERRORS}; of a list, the first item.")
 
 
 Render = Callable[[Request, Problem], Response]
@@ -166,11 +168,13 @@ def respond(render: Render, request: Request, error: Exception) -> Response:
 
 
 def _validation(error: RequestValidationError) -> Problem:
-    found = error.errors()
+    for one in error.errors():
+        raised = one.get("ctx", {}).get("error")
+        if isinstance(raised, Exception):
+            raised.__traceback__ = None  # its frames hold the body and this error, which holds it
+    found = error.errors()[:MOST_ERRORS]
     places = [_field((*e["loc"], "kind") if e["type"] in _TAGS else e["loc"]) for e in found]
     problems = [FieldProblem(field=shortened(at), message=shortened(_sentence(e))) for at, e in zip(places, found, strict=True)]
-    if any(e["type"] == "json_invalid" for e in found):
-        return problem_of(CirisError("malformed_json", "the body is not JSON", field="body", hint=_DESCRIBED))
     if isinstance(error.body, bytes):
         hint = "send `Content-Type: application/json`"
         return problem_of(CirisError("invalid_request", "the body is not said to be JSON", field="Content-Type", hint=hint))
@@ -181,6 +185,8 @@ def _validation(error: RequestValidationError) -> Problem:
 
 
 def _http(error: HTTPException) -> Problem:
+    if isinstance(error.__cause__, CirisError):
+        return problem_of(error.__cause__)
     status = HTTPStatus(error.status_code)
     code = OF_THE_FRAMEWORK.get(status, "internal" if status >= HTTPStatus.INTERNAL_SERVER_ERROR else "bad_request")
     return problem_of(CirisError(code, error.detail, field=_PLACES.get(status), hint=_DESCRIBED), status)

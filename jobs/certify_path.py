@@ -25,7 +25,7 @@ from db.session import Database, database
 from db.transaction import Afterwards, persistently
 from jobs import obstacles
 from jobs.curves import BEZIER, CONTROL_POINTS, KNOTS, Bezier, ControlPoints, Knots, one_curve
-from jobs.fields import Flag, Positions, Real, Request, Vector
+from jobs.fields import Flag, NamedPoints, Points, Real, Request
 from jobs.kind import Done, Held, Kind, Turn, in_child, report_of
 from jobs.request import JobRequest
 from workers.app import send_work
@@ -34,8 +34,8 @@ MOTION = "motion"
 """The kind of the step, and of the action that asks for it."""
 CERTIFY = "certifier.jobs.motion:certify_in_child"
 MAX_PIECES = 2000
-Waypoints = Annotated[list[Vector], Field(min_length=2, max_length=2000)]
-NamedWaypoints = Annotated[list[Positions], Field(min_length=2, max_length=2000)]
+Waypoints = Annotated[Points, Field(min_length=2, max_length=2000)]
+NamedWaypoints = Annotated[NamedPoints, Field(min_length=2, max_length=2000)]
 
 
 class GivenMotion(Request):

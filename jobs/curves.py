@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from jobs.fields import Real, Vector
+from jobs.fields import Numbers, Points
 
 BEZIER = (
     "(k, m + 1, n), the control points of every polynomial piece, all of one degree m from 1 to 15. A piece begins exactly where the one "
@@ -17,9 +17,9 @@ KNOTS = (
     "count from 0."
 )
 CONTROL_POINTS = "(k, n), the control points of the B-spline; its Bezier pieces, rounded to doubles, are the motion."
-Bezier = Annotated[list[Annotated[list[Vector], Field(min_length=2, max_length=16)]], Field(min_length=1)]
-Knots = Annotated[list[Real], Field(min_length=4, max_length=2016)]
-ControlPoints = Annotated[list[Vector], Field(min_length=2, max_length=2000)]
+Bezier = Annotated[list[Annotated[Points, Field(min_length=2, max_length=16)]], Field(min_length=1, fail_fast=True)]
+Knots = Annotated[Numbers, Field(min_length=4, max_length=2016)]
+ControlPoints = Annotated[Points, Field(min_length=2, max_length=2000)]
 
 
 def one_curve(q: object, s: object, bezier: object, knots: object, control_points: object) -> None:

@@ -13,6 +13,7 @@ from pydantic import (
     WithJsonSchema,
     WrapValidator,
     create_model,
+    model_validator,
 )
 from pydantic_core import PydanticCustomError, PydanticKnownError
 
@@ -37,7 +38,9 @@ def whole(least: float | None, greatest: float | None) -> Any:
 
 Flag = Annotated[bool, Field(strict=True)]
 Real = Annotated[float, Field(allow_inf_nan=False, strict=True)]
-Vector = Annotated[list[Real], Field(min_length=1, max_length=64)]
+Numbers = Annotated[list[Real], Field(fail_fast=True)]
+"""Of a list, errors name the first item that is wrong: to name all of a long one takes seconds. So it is with all lists of requests."""
+Vector = Annotated[Numbers, Field(min_length=1, max_length=64)]
 MAX_NAMES = 2000
 """Names of configurations have at most this many characters together."""
 
@@ -86,14 +89,25 @@ SceneName = Annotated[
         description="The id or the name of a scene. `NAME@staged` is the scene that is staged as the next version of a name.",
     ),
 ]
-Rows = Annotated[list[Vector], Field(max_length=2000)]
-Offsets = Annotated[list[Real], Field(max_length=2000)]
+Points = Annotated[list[Vector], Field(fail_fast=True)]
+NamedPoints = Annotated[list[Positions], Field(fail_fast=True)]
+Rows = Annotated[Points, Field(max_length=2000)]
+Offsets = Annotated[Numbers, Field(max_length=2000)]
+MOST_FIELDS = 30
 
 
 class Request(BaseModel):
     """All requests derive from this model: it refuses unknown fields and numbers that are not finite."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _few_fields(cls, given: Any) -> Any:
+        """Refuses what has far more fields than any request, at once: to say of each that there is none takes long."""
+        if isinstance(given, dict) and len(given) > MOST_FIELDS:
+            raise ValueError(f"there are more than {MOST_FIELDS} fields")
+        return given
 
 
 def model_of(cls: type) -> type[Request]:
@@ -121,10 +135,11 @@ def _type(one: Option) -> Any:
             assert one.cls is not None
             return model_of(one.cls)
         case _:
-            row = Positions if one.positions else Vector
-            path = Annotated[list[row], Field(min_length=2, max_length=one.most)]  # type: ignore[valid-type]
-            rows = Annotated[list[row], Field(max_length=2000)]  # type: ignore[valid-type]
-            lists = {Takes.POINT: row if one.most is None else list[Real], Takes.POINTS: rows, Takes.PATHS: list[path]}
+            row, points = (Positions, NamedPoints) if one.positions else (Vector, Points)
+            path = Annotated[points, Field(min_length=2, max_length=one.most)]  # type: ignore[valid-type]
+            rows = Annotated[points, Field(max_length=2000)]  # type: ignore[valid-type]
+            paths = Annotated[list[path], Field(fail_fast=True)]
+            lists = {Takes.POINT: row if one.most is None else Numbers, Takes.POINTS: rows, Takes.PATHS: paths}
             numbers = {Takes.WHOLE: whole(one.least, one.greatest), Takes.REAL: Annotated[Real, _bounds(one)]}
             return {**numbers, Takes.FLAG: Flag, Takes.LABELS: Labels, **lists}[one.takes]
 

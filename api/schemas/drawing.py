@@ -8,7 +8,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from api.schemas.planning import REGION, SCENE, Q, RegionId
 from certifier.model import JointKind
-from jobs.fields import Positions, Real, Request, SceneName, integer
+from jobs.fields import NamedPoints, Positions, Real, Request, SceneName, integer
 
 MAX_CONTACTS, MAX_SIZE, MAX_REGIONS, MAX_SAMPLES = 100, 200, 200, 500
 
@@ -122,7 +122,7 @@ class ContactsRequest(Request):
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": SCENE, "q": [[0.4, 0.3]]}]})
 
     scene: SceneName
-    q: list[Positions] = Field(
+    q: NamedPoints = Field(
         min_length=1, max_length=MAX_CONTACTS, description="(k, n), joint positions in radians or metres.", examples=[[[0.4, 0.3]]]
     )
 

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from certifier.outcome import Guarantee
 from jobs.curves import BEZIER, CONTROL_POINTS, KNOTS, Bezier, ControlPoints, Knots, one_curve
-from jobs.fields import Positions, Real, Request, SceneName, Vector
+from jobs.fields import NamedPoints, Points, Real, Request, SceneName
 from planner.motion.space import Space
 
 MAX_POINTS, MAX_NEAREST = 10_000, 1000
@@ -23,8 +23,8 @@ POINTS_IN_Q = "(k, n), joint positions in radians or metres, one row a point."
 POINTS_IN_S = "(k, n), tangent-space coordinates s, one row a point."
 Moment = Annotated[Real, Field(ge=-1e100, le=1e100)]
 """Differences of times do not overflow."""
-Ends = Annotated[list[Vector], Field(min_length=2, max_length=2)]
-NamedEnds = Annotated[list[Positions], Field(min_length=2, max_length=2)]
+Ends = Annotated[Points, Field(min_length=2, max_length=2)]
+NamedEnds = Annotated[NamedPoints, Field(min_length=2, max_length=2)]
 Q = Annotated[list[float], Field(description="(n,), joint positions in radians or metres.", examples=[[0.4, 0.3]])]
 S = Annotated[list[float], Field(description="(n,), tangent-space coordinates.", examples=[[0.2027, 0.1511]])]
 RegionId = Annotated[str, Field(description="Id of a region.", examples=[REGION])]
@@ -37,8 +37,8 @@ class _Points(Request):
     """Gives points, either as joint positions `q` or as tangent-space coordinates `s`."""
 
     scene: SceneName
-    q: list[Positions] | None = Field(None, min_length=1, max_length=MAX_POINTS, description=POINTS_IN_Q, examples=[[[0.4, 0.3]]])
-    s: list[Vector] | None = Field(None, min_length=1, max_length=MAX_POINTS, description=POINTS_IN_S, examples=[[[0.2027, 0.1511]]])
+    q: NamedPoints | None = Field(None, min_length=1, max_length=MAX_POINTS, description=POINTS_IN_Q, examples=[[[0.4, 0.3]]])
+    s: Points | None = Field(None, min_length=1, max_length=MAX_POINTS, description=POINTS_IN_S, examples=[[[0.2027, 0.1511]]])
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
@@ -58,8 +58,8 @@ class NearestRequest(_Points):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "iiwa-shelf", "q": [[0, 0.3, 0, -1.8, 0, 0.9, 0]]}]})
 
-    q: list[Positions] | None = Field(None, min_length=1, max_length=MAX_NEAREST, description=POINTS_IN_Q, examples=[[[0.4, 0.3]]])
-    s: list[Vector] | None = Field(None, min_length=1, max_length=MAX_NEAREST, description=POINTS_IN_S, examples=[[[0.2027, 0.1511]]])
+    q: NamedPoints | None = Field(None, min_length=1, max_length=MAX_NEAREST, description=POINTS_IN_Q, examples=[[[0.4, 0.3]]])
+    s: Points | None = Field(None, min_length=1, max_length=MAX_NEAREST, description=POINTS_IN_S, examples=[[[0.2027, 0.1511]]])
 
 
 class _Motion(Request):
@@ -87,14 +87,14 @@ class SegmentRequest(_Motion):
         json_schema_extra={"examples": [{"scene": "planar-2dof", "q": [[[0.4, 0.3], [0.6, 0.3]], [[0.4, 0.3], [1.5, -2.0]]]}]}
     )
 
-    q: list[NamedEnds] | None = Field(
+    q: Annotated[list[NamedEnds], Field(fail_fast=True)] | None = Field(
         None,
         min_length=1,
         max_length=MAX_SEGMENTS,
         description="(k, 2, n), begin and end of each motion, joint positions in radians or metres.",
         examples=[[[[0.4, 0.3], [0.6, 0.3]]]],
     )
-    s: list[Ends] | None = Field(
+    s: Annotated[list[Ends], Field(fail_fast=True)] | None = Field(
         None,
         min_length=1,
         max_length=MAX_SEGMENTS,
@@ -117,14 +117,14 @@ class PathRequest(_Motion):
         json_schema_extra={"examples": [{"scene": "planar-2dof", "q": [[0.4, 0.3], [0.6, 0.3], [0.6, 0.5]], "times": [0, 0.5, 1.25]}]}
     )
 
-    q: list[Positions] | None = Field(
+    q: NamedPoints | None = Field(
         None,
         min_length=2,
         max_length=MAX_WAYPOINTS,
         description="(k, n), waypoints, joint positions in radians or metres.",
         examples=[[[0.4, 0.3], [0.6, 0.3]]],
     )
-    s: list[Vector] | None = Field(
+    s: Points | None = Field(
         None,
         min_length=2,
         max_length=MAX_WAYPOINTS,
@@ -134,7 +134,7 @@ class PathRequest(_Motion):
     bezier: Bezier | None = Field(None, max_length=MAX_SEGMENTS, description=BEZIER)
     knots: Knots | None = Field(None, description=KNOTS)
     control_points: ControlPoints | None = Field(None, max_length=MAX_SEGMENTS, description=CONTROL_POINTS)
-    times: list[Moment] | None = Field(
+    times: Annotated[list[Moment], Field(fail_fast=True)] | None = Field(
         None,
         min_length=2,
         max_length=MAX_WAYPOINTS + 1,

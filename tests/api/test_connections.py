@@ -148,6 +148,16 @@ def test_headers_that_trickle_are_refused_on_a_kept_connection(served: Serving) 
             assert problem(everything(slow)) == (408, "too_slow")
 
 
+@pytest.mark.parametrize("first", [b"GET /" + b"x" * 1000, b"GET / HTTP/1.1\r\nHost: localhost\r\nX-Long: x"])
+def test_an_address_and_headers_without_end_are_refused(served: Serving, first: bytes) -> None:
+    with served.connect() as long:
+        long.sendall(first)
+        for _ in range(3):
+            time.sleep(0.05)
+            long.sendall(bytes(connections.HEAD_BYTES // 2).replace(b"\0", b"x"))
+        assert problem(everything(long)) == (431, "too_large")
+
+
 def test_a_body_that_trickles_is_refused(served: Serving) -> None:
     with served.connect() as slow:
         slow.sendall(b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100000\r\n\r\n")

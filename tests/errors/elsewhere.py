@@ -8,6 +8,7 @@ PROOF_FILES = ("certifier/document.py", "certifier/proof/", "certifier/verify/")
 TESTED = {
     "api/children.py:run": "tests/api/test_places.py",
     "api/connections.py:": "tests/api/test_connections.py",
+    "api/guard.py:counted": "tests/api/test_bodies.py",
     "api/problems.py:_unavailable": "tests/api/test_odd_requests.py",
     "api/problems.py:_unexpected": "tests/api/test_problems.py",
     "api/routers/results.py:_map_job": "tests/workers/test_maps.py",

@@ -243,7 +243,11 @@ SERVICE: Table = {
     ("unknown_host", "Host"): [lambda t: t.ask("GET", "/healthz", headers={"Host": "evil.example"})],
     ("cross_site", "Origin"): [lambda t: t.ask("POST", "/v1/jobs/x/cancel", headers={"Origin": "https://evil.example"})],
     ("invalid_request", "url"): [lambda t: t.ask("GET", "/v1/scenes?after=%00")],
-    ("too_large", "body"): [lambda t: t.ask("POST", "/v1/jobs", content=b"", headers={"Content-Length": str(1 << 40)})],
+    ("too_large", "body"): [
+        lambda t: t.ask("POST", "/v1/jobs", content=b"", headers={"Content-Length": str(1 << 40)}),
+        lambda t: t.ask("POST", "/v1/jobs", content="," * 1_000_000, headers={"Content-Type": "application/json"}),
+    ],
+    ("too_large", "url"): [lambda t: t.ask("GET", f"/v1/jobs?search={'x' * 40_000}")],
     ("content_encoding", "Content-Encoding"): [lambda t: t.ask("POST", "/v1/jobs", content=b"", headers={"Content-Encoding": "gzip"})],
     ("malformed_json", "body"): [lambda t: t.ask("POST", "/v1/jobs", content="{", headers={"Content-Type": "application/json"})],
     ("invalid_request", "Content-Type"): [lambda t: t.ask("POST", "/v1/jobs", content="{}", headers={"Content-Type": "text/plain"})],
