@@ -12,7 +12,7 @@ from api.pages import copies
 from api.pages.job import elapsed
 from api.pages.rendering import page
 from api.parameters import KNOWN_TO_PAGE
-from api.routers import jobs, scenes
+from api.routers import jobs, regions, scenes
 from certifier.conditions import of_condition
 from certifier.model import Scene
 from db import pairs
@@ -41,6 +41,7 @@ def compare_jobs_page(request: Request, a: str, b: str, db: Db) -> Response:
         "kinds": [KINDS[job.kind] for job in both],
         "names": [scenes.get_scene(job.scene, db).name for job in both],
         "elapsed": [elapsed(job) for job in both],
+        "sizes": [regions.get_region(job.region, db).q_volume if job.region else None for job in both],
         "spent": spent,
         "begun": begun,
         "differ": [(name, values) for name, values in known if values[0] != values[1]],

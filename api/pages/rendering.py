@@ -29,9 +29,21 @@ _SECURITY = {
 }
 
 
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
 def powers(unit: str) -> str:
     """Returns a unit with its powers raised, as people write them: rad^3 m as rad³ m."""
-    return re.sub(r"\^(\d+)", lambda power: power[1].translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")), unit)
+    return re.sub(r"\^(\d+)", lambda power: power[1].translate(_RAISED), unit)
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """Returns a number with so many significant digits, as people write it: 8190, and 1.15 · 10⁻¹² where it is far from 1."""
+    text, _, exponent = f"{value:.{digits}g}".partition("e")
+    if not exponent:
+        return text
+    power = int(exponent)
+    return f"{float(f'{text}e{power}'):.0f}" if 0 < power < 6 else f"{text} · 10{str(power).translate(_RAISED)}"
 
 
 _STAGES = {"given": "the given polytope", "box": "a box around the seed", "cells": "cell by cell"}
@@ -105,6 +117,7 @@ templates.env.filters |= {
     "powers": powers,
     "radians": math.radians,
     "rounded_down": rounded_down,
+    "significant": significant,
     "stage": stage,
     "work_in_words": work_in_words,
 }

@@ -455,6 +455,8 @@ def test_a_path_from_a_file_is_certified_and_played(page: Any, url: str, planar:
     said = page.locator(".upload .notice").text_content()
     proved = float(said.split("at least ")[1].split(" mm")[0])
     assert proved <= 1000 * verdict["clearance"] <= 1.02 * proved
+    claim = page.locator("#claim-motion").text_content()
+    assert claim.startswith(f"Proved: on all of the motion, the bodies of each covered pair are at least {proved:g} mm apart; verified now")
     assert "as seconds, from 0 on" in page.locator(".upload").text_content()
     page.get_by_label("speed").select_option("2")
     page.get_by_role("button", name="Play", exact=True).press("Enter")
@@ -475,12 +477,26 @@ def test_the_first_contact_of_a_path_is_shown(page: Any, url: str, planar: Scene
     assert shown(page) == pytest.approx(np.rad2deg(stop["q"]), abs=0.06)
     assert f"with {stop['a']} and {stop['b']} painted" in page.locator(".robot canvas").get_attribute("aria-label")
     assert [part.get_attribute("class") for part in page.locator(".parts li").all()] == ["motion", "nothing"]
+    claim = page.locator("#claim-motion").text_content()
+    assert claim.startswith("Not proved from ")
+    assert "; proved before, verified now" in claim
+    proved = float(claim.split("Not proved from ")[1].split(" s ")[0])
+    assert 0.3 < proved <= 0.3 + 0.8 * stop["time"] + 0.005, (
+        "the motion moves by a radian a second, and is proved until the contact at most"
+    )
     assert "1 radian or metre a second" in page.locator(".upload").text_content()
     time = page.get_by_label("Time, seconds")
     time.focus()
     time.press("End")
     page.locator(".moment", has_text="where nothing is proved").wait_for()
     assert "painted" not in page.locator(".robot canvas").get_attribute("aria-label")
+
+
+def test_a_path_that_begins_in_contact_is_nowhere_proved(page: Any, url: str, planar: Scene) -> None:
+    upload(page, url, "path.csv", "0.5236, 0.2618\n-0.3, 0.1\n")
+    page.get_by_text("Not certified.").wait_for()
+    assert page.locator("#claim-motion").text_content() == "Not proved from 0.00 s of the motion on."
+    assert [part.get_attribute("class") for part in page.locator(".parts li").all()] == ["nothing"]
 
 
 @pytest.mark.parametrize(

@@ -67,6 +67,11 @@ def test_two_jobs_are_compared(page: Any, url: str, client: TestClient, database
     page.get_by_text("2 options are the same in both.").wait_for()
     row = page.get_by_role("row").filter(has_text="Pairs settled in the last iteration").locator("td")
     assert row.all_text_contents() == ["2 of 2", "\N{EN DASH}"]
+    page.get_by_text("They are as the API has them: in radians and metres.").wait_for()
+    volume = client.get(f"/v1/regions/{region}").json()["q_volume"]
+    row = page.get_by_role("row").filter(has_text="Average width of it").locator("td")
+    assert row.all_text_contents() == [f"volume {volume['value']:.3g} m", "\N{EN DASH}"], "a joint that slides has no width in degrees"
+    page.get_by_text("Each share is of the job's own starting region.").wait_for()
     kept = page.get_by_role("region", name="Kept of the starting region, over time", exact=True)
     kept.get_by_text("nothing yet").wait_for()
     assert kept.locator(f'.halves a[href="/regions/{region}"]').count() == 1

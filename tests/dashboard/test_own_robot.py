@@ -216,6 +216,28 @@ def test_a_robot_that_collides_at_its_centre_begins_beside_it(
     assert joints(page) == [0.0, 0.0]
 
 
+def test_the_page_of_a_scene_begins_where_the_robot_is_free(page: Any, url: str, client: TestClient, tmp_path: Path, barriers: Any) -> None:
+    path = packed(tmp_path, arm___urdf=urdf("arm", "link.obj").replace("</collision>", f"</collision>{BALL}", 1), link___obj=TETRAHEDRON)
+    client.post("/v1/scenes", files={"bundle": ("arm.zip", path.read_bytes(), "application/zip")}).raise_for_status()
+    page.goto(f"{url}/scenes/arm")
+    page.get_by_text("The robot began at a free configuration near it.").wait_for()
+    page.get_by_text("No collision (computed, not proved)").wait_for()
+    assert barriers(page) == []
+    graph = client.get("/v1/planning/graph?scene=arm").json() | {"nodes": [{"region": "0123456789", "component": 0}], "components": 1}
+    page.route("**/v1/planning/graph*", lambda route: route.fulfill(json=graph))
+    page.route(
+        "**/v1/regions/0123456789/*", lambda route: route.fulfill(json={"center": [1.0, 0.5], "seed": None, "samples": [], "extremes": []})
+    )
+    page.goto(f"{url}/scenes/arm")
+    page.get_by_text("The robot began at the centre of region 01234567.").wait_for()
+    assert np.deg2rad(joints(page)) == pytest.approx([1.0, 0.5], abs=1e-3)
+    # Whoever asks for q* gets it.
+    page.goto(f"{url}/scenes/arm?q=0,0")
+    page.get_by_text("Not free: arm/base/").wait_for()
+    page.wait_for_timeout(1000)
+    assert joints(page) == [0.0, 0.0]
+
+
 def test_a_robot_that_is_moved_while_a_free_configuration_is_looked_for_stays_where_it_is(page: Any, url: str, tmp_path: Path) -> None:
     held: list[Any] = []
     page.route("**/v1/planning/plan", lambda route: held.append(route))
@@ -294,3 +316,13 @@ def test_a_proposal_tells_its_progress_beside_a_settled_iteration(
     page.reload()
     page.get_by_role("heading", name="Iteration 0: a box around the seed since").wait_for()
     page.locator("p.empty", has_text="Looking for a starting region around the seed").wait_for(state="detached")  # the log says it, too
+
+
+def test_a_long_name_stays_in_its_place(page: Any, url: str, client: TestClient, tmp_path: Path) -> None:
+    name = "a_robot_whose_name_somebody_made_long_with_box_collision"
+    path = packed(tmp_path, **{f"{name}___urdf": urdf("arm", "link.obj"), "link___obj": TETRAHEDRON})
+    client.post("/v1/scenes", files={"bundle": ("arm.zip", path.read_bytes(), "application/zip")}).raise_for_status()
+    page.goto(f"{url}/scenes/{client.get('/v1/scenes').json()['scenes'][0]['id']}")
+    fact = page.locator(".facts dd").first
+    assert fact.text_content() == name
+    assert fact.evaluate("(one) => one.scrollWidth - one.clientWidth") == 0

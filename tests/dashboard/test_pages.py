@@ -13,6 +13,7 @@ from fastapi.testclient import TestClient
 
 import dashboard
 from api.pages.job import progress
+from api.pages.rendering import significant
 from api.schemas.jobs import Iteration, PairCell, PairMatrix
 from api.schemas.scenes import PairInfo
 from certifier.jobs.region import Region
@@ -20,9 +21,10 @@ from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.verify.decimals import at_least_mm
 from db import jobs, leases, pairs, regions, scenes, steps, workers
+from db.models import StepRow
 from db.pairs import NewPair
 from db.session import Database
-from db.states import IterationState, JobState, PairState, StepState, WorkerState
+from db.states import ACCEPT, IterationState, JobState, PairState, StepState, WorkerState
 from db.workers import Made, WorkerKind
 from tests.api.test_planning import store_map
 from tests.db.builders import add_iteration
@@ -107,6 +109,50 @@ def test_the_claim_of_a_scene_names_its_map(client: TestClient, database: Databa
     alone = claim_of(client.get("/scenes/slider").text)
     assert f'Proved:</span> in the proved cells of the <a href="/jobs/{job}">latest map</a> of this scene' in alone
     assert f"<dt>Pairs covered</dt><dd>{len(scene.pairs)}</dd>" in alone
+
+
+def map_page(client: TestClient, database: Database, scene: Scene, **stored: object) -> str:
+    """The page of a job whose map was stored with this report."""
+    report = {"cells": 3, "uncovered_pairs": 0, "at": [], "paths": [], "proof": "ab" * 32, "proof_bytes": 1, "free_set": True} | stored
+    with database.write() as session:
+        row = scenes.add(session, scene)
+        job, _ = jobs.create(session, kind="map", scene_id=row.id, options={"paths": [[[0.0], [0.1]]] * len(report["paths"])})
+        jobs.start(session, job)
+        session.add(StepRow(job_id=job.id, turn=1, input={}, kind=ACCEPT, state=StepState.DONE, report=report, data=b""))
+    return client.get(f"/jobs/{job.id}").text
+
+
+def test_the_page_of_a_map_says_what_is_known_of_each_wanted_configuration(client: TestClient, database: Database) -> None:
+    """What is not proved does not look proved, whether or not bodies touch there."""
+    wanted = [{"q": [0.1], "state": "proved"}, {"q": [0.2], "state": "open"}, {"q": [0.3], "state": "in_collision"}]
+    text = map_page(client, database, slider(), at=wanted, paths=[1.0, 0.99999, 0.0])
+    rows = re.findall(r"<tr><td>(0\.\d+) m</td><td>(.*?)</td></tr>", text)
+    assert rows == [
+        ("0.1000", '<span class="proved">proved free of collision</span>'),
+        ("0.2000", "not proved"),
+        ("0.3000", '<span class="computed">in collision</span>'),
+    ]
+    shares = re.findall(r'<td class="number"><span class="proved">([\d.]+) %</span></td>', text)
+    assert shares == ["100.0", "99.9", "0.0"], "a proved share is rounded down"
+
+
+def test_a_map_that_leaves_a_pair_without_a_cell_proves_no_configuration(client: TestClient, database: Database) -> None:
+    said = "1 pair of bodies has no proved cell, so no configuration is proved to be free of collision."
+    assert said in map_page(client, database, slider(), uncovered_pairs=1)
+    assert "no configuration is proved" not in map_page(client, database, slider())
+
+
+def test_numbers_have_no_exponent_of_a_computer() -> None:
+    said = {0.86: "0.86", 8190.0: "8190", 1.15e-12: "1.15 \N{MIDDLE DOT} 10\u207b\u00b9\u00b2", 2e9: "2 \N{MIDDLE DOT} 10\u2079", 0.0: "0"}
+    assert {value: significant(value) for value in said} == said
+    assert significant(800.0, 1) == "800"
+
+
+def test_a_job_whose_joints_slide_has_no_width_in_degrees(client: TestClient, region: str) -> None:
+    text = client.get(f"/jobs/{client.get(f'/v1/regions/{region}').json()['job']}").text
+    facts = text.partition('<dl class="facts">')[2].partition("</dl>")[0]
+    assert "<dt>Volume in joint positions</dt>" in facts
+    assert "Average width" not in facts
 
 
 def test_where_nothing_is_proved_no_numbers_are_said(client: TestClient, database: Database) -> None:

@@ -145,12 +145,15 @@ def test_the_sweep_stays_inside_and_can_be_paused(opened: Any, planar: Scene, fa
     assert np.array_equal(shown(opened), stopped)
 
 
-def test_the_slice_is_what_samples_say_and_leads_the_robot(opened: Any, planar: Scene) -> None:
+def test_the_slice_is_what_samples_say_and_leads_the_robot(opened: Any, planar: Scene, faces: tuple[Array, Array]) -> None:
     size = 90
     middles = -1.2 + 2.4 * (np.arange(size) + 0.5) / size
     q = np.array([[x, y] for y in middles for x in middles])
     taken = round(100 * in_collision(planar, planar.to_s(q)).mean())
-    assert f"{taken} % in collision" in opened.locator(".slice figcaption").text_content()
+    C, d = faces
+    covered = round(100 * (planar.to_s(q) @ C.T <= d).all(axis=1).mean())
+    said = opened.locator(".slice figcaption").text_content()
+    assert f"{covered} % of this slice is in certified regions, {taken} % in collision" in said
     canvas = opened.locator(".slice canvas")
     box = canvas.bounding_box()
     canvas.click(position={"x": 52 + 0.75 * (box["width"] - 62), "y": 10 + 0.25 * (box["height"] - 44)})

@@ -45,7 +45,7 @@ function Over({ measure, jobs }: { measure: Measure; jobs: Measured[] }) {
   return (
     <section aria-label={measure.title}>
       <h2>{measure.title}</h2>
-      <p class="small quiet">Shares are estimated from samples; {measure.proved}.</p>
+      <p class="small quiet">Each share is {measure.whole}. Shares are estimated from samples; {measure.proved}.</p>
       <Chart curves={drawn} what={measure.title} />
       <div class="halves">
         {jobs.map(({ name, points }) => (

@@ -23,6 +23,8 @@ export interface Measure {
   title: string;
   /** What follows the last share in a sentence. */
   reached: string;
+  /** What each share is a part of, where several jobs are compared. */
+  whole: string;
   /** What is proved, although the share is estimated. */
   proved: string;
   /** What the points' numbers are; null where they have none. */
@@ -33,6 +35,7 @@ export interface Measure {
 const KEPT: Measure = {
   title: "Kept of the starting region, over time",
   reached: "of the starting region is kept",
+  whole: "of the job's own starting region",
   proved: "each region is certified by its own proof",
   number: "Iteration",
   points: async (job) => {
@@ -44,6 +47,7 @@ const KEPT: Measure = {
 const COVERED: Measure = {
   title: "Covered, over time",
   reached: "of the free configurations are in regions of the scene",
+  whole: "of the free configurations",
   proved: "each region is certified by its own proof",
   number: "Regions",
   points: async (job) => (await get<Cover>(`/v1/jobs/${job}/cover`)).curve.map(([seconds, share, regions]) => ({ seconds, share, number: regions, region: null })),
@@ -52,6 +56,7 @@ const COVERED: Measure = {
 const PROVED: Measure = {
   title: "Proved, over time",
   reached: "of the free configurations are proved",
+  whole: "of the free configurations",
   proved: "the cells are proved",
   number: null,
   points: async (job) => (await get<JobMap>(`/v1/jobs/${job}/map`)).curve.map(([seconds, share]) => ({ seconds, share, number: null, region: null })),

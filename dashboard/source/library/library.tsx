@@ -5,6 +5,7 @@ import { get, MAY_START, said } from "../common/api";
 import { InClaim } from "../common/claim";
 import { positions } from "../common/kinematics";
 import { MomentText, touchingOf, useMoment } from "../common/moment";
+import { nearby } from "../common/nearby";
 import type { Space } from "../common/polytope";
 import { Robot } from "../common/drawn";
 import type { Approach, GraphResponse, RegionConfigurations, SceneModel } from "../common/schema";
@@ -43,8 +44,26 @@ function Library({ model, known, mapped }: { model: SceneModel; known: number; m
   const stay = useRef<HTMLDivElement>(null);
   const [pair, setPair] = useState<Approach | null>(null);
   const moment = useMoment(model.scene, q);
+  /** Where the robot began instead of at q*, and why. */
+  const [begun, setBegun] = useState<string | null>(null);
+  const latest = useRef(q);
+  latest.current = q;
+  const untouched = useRef(inAddress("q") === null ? q : null);
   useAddress({ q: unlessUsual(q, usual) });
 
+  // Nobody has asked for q*. Where it is not free, the robot begins in a region, or beside q*.
+  useEffect(() => {
+    if (moment.trouble.length === 0 || untouched.current !== q || !graph) return;
+    untouched.current = null;
+    const region = graph.nodes[0]?.region;
+    const free = region ? centre(region) : nearby(model, q);
+    // Without an answer it stays, and what is wrong there is said.
+    void free.catch(() => null).then((found) => {
+      if (!found || latest.current !== q) return;
+      setQ(found);
+      setBegun(`At q*, ${moment.trouble[0]}. The robot began at ${region ? `the centre of region ${region.slice(0, 8)}` : "a free configuration near it"}.`);
+    });
+  }, [moment, graph]);
   useEffect(() => {
     let timer: ReturnType<typeof setTimeout> | undefined;
     const ask = (): void => {
@@ -67,7 +86,7 @@ function Library({ model, known, mapped }: { model: SceneModel; known: number; m
 
   const choose = (region: string): void => {
     setChosen(region);
-    void get<RegionConfigurations>(`/v1/regions/${region}/configurations?samples=0`).then(({ center }) => setQ(center), (reason: unknown) => setGraphProblem(said(reason)));
+    void centre(region).then(setQ, (reason: unknown) => setGraphProblem(said(reason)));
   };
   const showPair = (found: Approach): void => {
     setPair(found);
@@ -91,6 +110,7 @@ function Library({ model, known, mapped }: { model: SceneModel; known: number; m
       <div class="views">
         <div class="stay" ref={stay}>
           <Robot model={model} q={q} onDrag={setQ} touching={touching} label={`The robot of ${model.name}${pair?.q === q ? `, with ${pair.a} and ${pair.b} painted` : touching.length ? ", not free" : ""}`} />
+          {begun && <p class="quiet small">{begun}</p>}
           {motion && <Player motion={motion} names={names} units={model.units} onMove={setQ} />}
           <Sliders names={names} units={model.units} lower={model.q_lower} upper={model.q_upper} q={q} onChange={setQ} />
         </div>
@@ -153,6 +173,10 @@ function Library({ model, known, mapped }: { model: SceneModel; known: number; m
       </div>
     </div>
   );
+}
+
+async function centre(region: string): Promise<number[]> {
+  return (await get<RegionConfigurations>(`/v1/regions/${region}/configurations?samples=0`)).center;
 }
 
 /** The coordinates of regions, which not everybody knows. */

@@ -1,6 +1,6 @@
 // A free configuration beside one that is not free, with room around it.
-import { post } from "../common/api";
-import type { ContactsResponse, PlanResponse, SceneModel } from "../common/schema";
+import { post } from "./api";
+import type { ContactsResponse, PlanResponse, SceneModel } from "./schema";
 
 /** The line away from the contact is looked at in so many steps, as far as this part of the joints' half ranges. */
 const STEPS = 30,
