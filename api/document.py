@@ -21,10 +21,10 @@ from api.problems import Problem
 EXAMPLES = Path(__file__).with_name("examples.json")
 UPLOAD = "Body_create_scene"
 
-ANYWHERE = ("unknown_host", "too_many_requests", "internal")
+ANYWHERE = ("unknown_host", "too_large", "too_many_requests", "internal")
 WITH_KEY = ("key_needed", "scope_missing", "database_unavailable")
 CHANGING = ("cross_site", "no_room")
-WITH_BODY = ("malformed_json", "invalid_request", "too_large", "content_encoding", "busy")
+WITH_BODY = ("malformed_json", "invalid_request", "content_encoding", "busy")
 PLACES = {
     "scene_id": ("scene_not_found", "ambiguous_id"),
     "job_id": ("job_not_found", "ambiguous_id"),
