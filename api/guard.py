@@ -41,15 +41,17 @@ SAME_SITE = frozenset({"same-origin", "none"})
 STATIC = "/static/"
 SIGN_INS_PER_SECOND = 5.0
 """One address may return from the identity provider this often, on average. At each return, the service asks the provider."""
+OF_PROJECT = 2.0
+"""All keys and people of a project together may make that many times as many requests as one of them."""
 WATCHED = frozenset({"/metrics"})
 """Monitoring asks for these. They are answered while the database hangs."""
 
 
 class TooManyRequests(CirisError):
-    """The caller has sent too many requests and must wait."""
+    """The caller, or its project, has sent too many requests and must wait."""
 
-    def __init__(self, seconds: float) -> None:
-        super().__init__("too_many_requests", "more requests than one caller may make", hint="wait as long as Retry-After says")
+    def __init__(self, seconds: float, who: str = "caller") -> None:
+        super().__init__("too_many_requests", f"more requests than one {who} may make", hint="wait as long as Retry-After says")
         self.headers = {"Retry-After": str(math.ceil(seconds))}
 
 
@@ -77,6 +79,7 @@ class Guard:
     ) -> None:
         self._app, self._keyring, self._hosts, self._respond = app, keyring, hosts, respond
         self._keys, self._addresses, self._sign_ins = Buckets(rate), Buckets(rate), Buckets(SIGN_INS_PER_SECOND)
+        self._projects = Buckets(OF_PROJECT * rate)
         self._held = Counter[str | None]()
         """Maps a project to the number of bytes of the bodies that are held for it."""
 
@@ -118,7 +121,7 @@ class Guard:
         """Finds out who asks (``request.state.caller``), except on public paths, and counts the request.
 
         A caller with a valid key, or who has signed in, is counted by the key or the person, wherever the caller is. So others behind the
-        same address cannot use up the caller's requests. Everybody else is counted by
+        same address cannot use up the caller's requests. All callers of a project are counted together, too. Everybody else is counted by
         address, before the guard does anything else for them; so is the first request of a key in this process. Health checks are not
         counted: who shares an address with them must not have the service ended.
         """
@@ -137,6 +140,8 @@ class Guard:
             caller = await self._keyring.newcomer(given)
             if caller is None:
                 raise KeyNeeded(headers)
+        if caller is not None and caller.id and (wait := self._projects.take(caller.project)) > 0:
+            raise TooManyRequests(wait, "project")
         scope.setdefault("state", {})["caller"] = caller
 
 

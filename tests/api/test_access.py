@@ -23,7 +23,7 @@ from api.limits import MAX_BUCKETS, Buckets
 from certifier.errors import CirisError
 from certifier.model import Scene
 from ciris.synchronous.client import Client
-from db import events, jobs, keys, version
+from db import events, jobs, keys, projects, version
 from db.keys import Scope
 from db.session import Database
 from tests.api.conftest import BASE_URL, PROBLEM
@@ -226,6 +226,19 @@ def test_every_key_has_its_own_rate(hasty: TestClient, database: Database) -> No
     while hasty.get("/v1/jobs", headers=bearer(one)).status_code == 200:
         pass
     assert hasty.get("/v1/jobs", headers=bearer(other)).status_code == 200
+
+
+def test_all_keys_of_a_project_have_a_rate_together(database: Database, environment: pytest.MonkeyPatch) -> None:
+    environment.setenv("CIRIS_REQUESTS_PER_SECOND", "20")
+    with database.write() as session:
+        projects.add(session, "other")
+        many = [keys.add(session, f"key{i}", Scope.READ) for i in range(9)]
+        other = keys.add(session, "other", Scope.READ, "other")
+    with TestClient(create_app(database), base_url=BASE_URL) as client:
+        asked = (client.get("/v1/project", headers=bearer(key)) for _ in range(39) for key in many)
+        refused = next(answer for answer in asked if answer.status_code != 200)
+        assert (refused.status_code, refused.json()["detail"]) == (429, "more requests than one project may make")
+        assert client.get("/v1/project", headers=bearer(other)).status_code == 200
 
 
 def test_guessing_keys_is_slow(hasty: TestClient, database: Database) -> None:
