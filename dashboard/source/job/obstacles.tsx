@@ -9,14 +9,23 @@ import type { Drawable } from "./store";
 
 const AT_FIRST = 5;
 
+interface Words {
+  about: Obstacle;
+  /** Whose page the configuration leads to. Null for none: a motion ends where bodies begin to touch, and rounding may see no contact there. */
+  scene: string | null;
+  units: Unit[];
+}
+
 /** What stands in the way, in words. The configuration in them leads to the page of the scene, where the robot stands there. */
-export function Said({ about: { text, at, q }, scene, units }: { about: Obstacle; scene: string; units: Unit[] }) {
+export function Said({ about: { text, at, q }, scene, units }: Words) {
   if (!at || !q) return <>{text}</>;
   const [before, after] = text.split(at);
+  const named = `q = (${q.map((value, i) => shown(value, units[i]!)).join(", ")})`;
+  if (!scene) return <>{before}{named}{after}</>;
   return (
     <>
       {before}
-      <a href={`/scenes/${scene}?q=${q.join(",")}`} title="The robot at this configuration">q = ({q.map((value, i) => shown(value, units[i]!)).join(", ")})</a>
+      <a href={`/scenes/${scene}?q=${q.join(",")}`} title="The robot at this configuration">{named}</a>
       {after}
     </>
   );
@@ -49,7 +58,7 @@ export function Obstacles({ obstacles, robot, whom, scene, units }: Props) {
             <ol class="obstacles">
               {inView.map((one) => (
                 <li key={key(one)} class={one === drawn ? "chosen" : ""}>
-                  <p><Said about={one} scene={scene} units={units} /></p>
+                  <p><Said about={one} scene={whom === "the motion" ? null : scene} units={units} /></p>
                   <p class="links">
                     {one.q && (
                       <button type="button" class="plain" aria-pressed={one === drawn} onClick={() => setChosen(key(one))}>

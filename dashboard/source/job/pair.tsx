@@ -82,7 +82,7 @@ export function Pair({ store, version, robot, scene, route }: Props) {
         {where && <Contact pair={route.pair} a={pair.a} b={pair.b} q={where} robot={robot} />}
         <div>
           {iteration && <p class="said">{sentence(facts(letter, iteration, rest, store.units).join("; "))}.</p>}
-          {about && <p class="said"><Said about={about} scene={scene} units={store.units} /></p>}
+          {about && <p class="said"><Said about={about} scene={iteration ? scene : null} units={store.units} /></p>}
         </div>
       </div>
       {problem &&
