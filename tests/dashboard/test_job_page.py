@@ -100,7 +100,7 @@ def test_the_page_finds_out_who_works_without_an_event(page: Any, url: str, data
     page.goto(f"{url}/jobs/{job.id}")
     page.get_by_text("No process works on the job at this moment.").wait_for()
     assert page.locator(".title .badge").text_content() == "queued: no worker"
-    page.get_by_text("Queued: no worker.").wait_for()
+    page.get_by_text("Nobody is there who can do what comes next.").wait_for()
     asked: list[float] = []
     page.on("request", lambda request: asked.append(time.monotonic()) if request.url.endswith("/workers") else None)
     while len(asked) < 3:

@@ -96,7 +96,7 @@ def test_a_job_says_that_workers_compile_also_on_a_phone(page: Any, url: str, sc
         job, _ = jobs.create(session, kind="grow", scene_id=scene.hash[:16], options={"seed": {"q": [0.0]}})
     page.set_viewport_size({"width": 390, "height": 844})
     page.goto(f"{url}/jobs/{job.id}")
-    page.get_by_text("Queued: workers compile, which takes some minutes, once.").wait_for()
+    page.get_by_text("It goes on by itself when they are ready.").wait_for()
     assert page.locator(".title .badge").text_content() == "queued: workers compile, which takes some minutes, once"
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
