@@ -38,7 +38,7 @@ def powers(unit: str) -> str:
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """Returns a number with so many significant digits, as people write it: 8190, and 1.15 · 10⁻¹² where it is far from 1."""
+    """Returns a number with this many significant digits, as people write it: 8190, and 1.15 · 10⁻¹² where it is far from 1."""
     text, _, exponent = f"{value:.{digits}g}".partition("e")
     if not exponent:
         return text
