@@ -31,6 +31,8 @@ GARBAGE = 20_000, 10, 100
 """The thresholds of Python's garbage collector: how many new objects start a pass over the young objects, then how many passes
 start one over the middle and over the old objects.
 """
+SWITCH_SECONDS = 0.0005
+"""A thread that computes gives way to another one after this time. One request waits for the interpreter several times."""
 
 
 def main() -> None:
@@ -44,6 +46,7 @@ def main() -> None:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(2)
     allow_files()
+    sys.setswitchinterval(SWITCH_SECONDS)
     traces.configure("api")
     config = uvicorn.Config(
         _frozen_app,

@@ -119,12 +119,15 @@ def all_the_time(
                 answered[ask(client).status_code] += 1
 
     threads = [threading.Thread(target=repeat, args=(keys_of_others[i % len(keys_of_others)],)) for i in range(clients)]
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-4)  # the latencies of the other client are those of the service, and not of this process
     for thread in threads:
         thread.start()
     time.sleep(5)
     try:
         yield answered
     finally:
+        sys.setswitchinterval(interval)
         over.set()
         for thread in threads:
             thread.join()

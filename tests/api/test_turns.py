@@ -7,6 +7,7 @@ import gc
 import weakref
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from threading import Event
 
 import pytest
@@ -99,3 +100,31 @@ def test_who_is_gone_takes_no_time_and_an_error_comes_back() -> None:
 
     asyncio.run(ask())
     assert begun == []
+
+
+def test_projects_that_ask_share_the_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("api.turns.LATELY_SECONDS", 1.0)
+    turns, go = Turns("test", threads=4, of_project=3), Event()
+
+    async def ask() -> None:
+        begun = list[str]()
+
+        def slow(name: str) -> None:
+            begun.append(name)
+            assert go.wait(30)
+
+        async def asked(name: str) -> list[asyncio.Task[None]]:
+            tasks = [asyncio.create_task(turns.run(name, partial(slow, name))) for _ in range(5)]
+            await asyncio.sleep(0.2)
+            return tasks
+
+        await turns.run("other", lambda: None)
+        tasks = await asked("many")
+        assert begun == ["many"]
+        await asyncio.sleep(1.0)
+        tasks += await asked("many")
+        assert begun == ["many"] * 3, "the other one has not asked lately"
+        go.set()
+        await asyncio.wait_for(asyncio.gather(*tasks), 30)
+
+    asyncio.run(ask())
