@@ -38,6 +38,8 @@ PATIENCE_SECONDS = 0.3
 """A request of monitoring waits this many seconds for the keys."""
 AGAIN_SECONDS = 0.1
 """When requests bring unknown keys or sessions, the database is read at most once in this many seconds, however many requests there are."""
+LATELY_SECONDS, TOGETHER = 30.0, 500
+"""Of the keys and sessions that were used within LATELY_SECONDS, the last TOGETHER are read again with any other."""
 MOST_KEYS = 10_000
 """This many keys and sessions are remembered. The one that was not used for longest is looked up again when it comes."""
 NOTES_SECONDS = 5.0
@@ -95,9 +97,10 @@ class Keyring:
     """A keyring recognises callers by their keys and sessions. It looks each up by its id, whatever others there are. What is said of
     keys here holds for sessions, too.
 
-    It remembers the ``MOST_KEYS`` keys that were used last. About twice in ``KEYS_SECONDS`` it reads those that were used meanwhile
-    again, all at once. So a revoked key is refused after ``KEYS_SECONDS`` at the latest, and a key that is in use never waits for a
-    reading while the database answers. What strangers send is not stored, and makes the keyring read at most once in ``AGAIN_SECONDS``.
+    It remembers the ``MOST_KEYS`` keys that were used last. While there are requests, it reads those that were used lately again about
+    twice in ``KEYS_SECONDS``, all at once. So a revoked key is refused after ``KEYS_SECONDS`` at the latest, and a key that is in use
+    hardly ever waits for a reading while the database answers. What strangers send is not stored, and makes the keyring read at most once
+    in ``AGAIN_SECONDS``.
 
     It has the use of a key noted, about every ten minutes while the key is in use (``db.keys.NOTED``). No request waits for that.
 
@@ -111,6 +114,8 @@ class Keyring:
         self._known: LRUCache[str, _Known] = LRUCache(MOST_KEYS)
         self._wanted: set[str] = set()
         """The ids that the next reading is to look up."""
+        self._lately: dict[str, float] = {}
+        """When keys and sessions were used, by their ids, the last one at the end."""
         self._read_at = -math.inf
         self._reading: asyncio.Future[None] | None = None
         self._used: set[str] = set()
@@ -166,7 +171,8 @@ class Keyring:
                 break
         if known is None:
             return None
-        self._wanted.add(id)
+        self._lately.pop(id, None)
+        self._lately[id] = time.monotonic()
         if known.read_at < time.monotonic() - KEYS_SECONDS / 2:
             self._read_soon()
         return known.held
@@ -190,7 +196,10 @@ class Keyring:
     async def _read_again(self, not_before: float) -> None:
         try:
             await asyncio.sleep(not_before - time.monotonic())
-            began, ids, self._wanted = time.monotonic(), self._wanted, set()
+            began = time.monotonic()
+            last = list(self._lately.items())[-TOGETHER:]
+            self._lately = {id: used_at for id, used_at in last if used_at > began - LATELY_SECONDS}
+            ids, self._wanted = self._wanted | self._lately.keys(), set()
             found, self._open = await asyncio.get_running_loop().run_in_executor(_thread, self._look_up, ids)
             for id in ids - found.keys():
                 self._known.pop(id, None)

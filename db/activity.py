@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import datetime, timedelta
 
 from sqlalchemy import case, func, select
 from sqlalchemy.orm import Session
@@ -34,10 +34,12 @@ class Kept:
     """What the database has said about all jobs and workers. Who asks often, keeps it for a moment.
 
     Attributes:
+        clock_ahead: by how much the database's clock is before this machine's.
         workers: what :func:`db.workers.counts` returns.
         ahead: the first jobs that wait for a worker of a kind.
     """
 
+    clock_ahead: timedelta | None = None
     workers: dict[tuple[str, str], int] | None = None
     queue_silent: bool = False
     ahead: dict[WorkerKind, list[str]] = field(default_factory=dict)
@@ -56,8 +58,9 @@ def of_jobs(session: Session, rows: Sequence[JobRow], kept: Kept | None = None) 
     children = session.scalars(found_below).all() if parents else ()
     below = of_jobs(session, children, kept) if children else {}
     held, waiting = _held(session, alive)
-    nobody = not held and all(row.coordinator is None for row in alive)
-    now = utcnow() if nobody else clock.now(session)  # which asks PostgreSQL
+    if kept.clock_ahead is None:
+        kept.clock_ahead = clock.now(session) - utcnow()
+    now = utcnow() + kept.clock_ahead
     queues = _Queues(session, kept)
     for row in alive:
         grown = [below[child.id] for child in children if child.parent_id == row.id]

@@ -15,6 +15,7 @@ from sqlalchemy import event, text
 from sqlalchemy.exc import OperationalError
 from starlette.routing import Mount
 
+from api import access
 from api.access import KEYS_SECONDS, Caller, Keyring, _Needs
 from api.app import create_app
 from api.delivery import every
@@ -310,19 +311,28 @@ def test_of_many_unknown_keys_at_once_one_has_the_keys_read(database: Database) 
     assert set(keyring._known) == {caller.key_id}, "nothing is kept of what strangers sent"
 
 
-def test_keys_in_use_are_read_again_together_and_others_are_not(database: Database) -> None:
+def test_keys_in_use_are_read_again_together_and_others_are_not(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(access, "TOGETHER", 5)
     used, unused = [a_key(database, Scope.READ, f"used{i}") for i in range(5)], a_key(database, Scope.READ, "unused")
     keyring = Keyring(database, open_without_keys=False)
 
     async def ask() -> list[str]:
-        for key in (*used, unused):
+        for key in (unused, *used):
             assert await keyring.newcomer(key) is not None
         await asyncio.sleep(KEYS_SECONDS)
         with readings(database) as seen:
             assert None not in await asyncio.gather(*(keyring.caller(key) for key in used))
+            for _ in range(20):
+                await asyncio.sleep(KEYS_SECONDS / 10)
+                assert await keyring.caller(used[0]) is not None
+            read = len(seen)
+            assert None not in await asyncio.gather(*(keyring.caller(key) for key in used))
+            assert len(seen) <= read + 1, "what one request has had read is read for all that were used lately"
+            assert await keyring.caller(unused) is not None
+            assert read < len(seen) <= read + 3
         return seen
 
-    assert len(asyncio.run(ask())) == 1
+    assert all(one.count("?") + one.count("%(") <= 6 for one in asyncio.run(ask())), "those used lately, and the one that is asked for"
 
 
 def uses(database: Database) -> dict[str, bool]:
