@@ -14,7 +14,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, Select, exists, func, insert, select, tuple_, update
+from sqlalchemy import ColumnElement, Row, Select, exists, func, insert, select, tuple_, update
 from sqlalchemy.orm import Session, defer
 
 from certifier import stored
@@ -28,6 +28,19 @@ from db.states import PAIR, IterationState, PairState, transition, transition_ea
 from db.types import utcnow
 
 UNFINISHED = unfinished(PAIR)
+_OF_RESULTS = (
+    PairRow.iteration,
+    PairRow.pair_index,
+    PairRow.state,
+    PairRow.stage,
+    PairRow.margin,
+    PairRow.seconds,
+    PairRow.open_cells,
+    PairRow.detail,
+    PairRow.worker,
+    PairRow.witness_s,
+    PairRow.proof_digest,
+)
 FAILED = frozenset(PairState) - UNFINISHED - {PairState.CERTIFIED, PairState.SKIPPED}
 MOST_TOGETHER = 100
 """At most this many pairs are claimed together, however short they are."""
@@ -350,7 +363,7 @@ def page(
     only: Collection[int] | None = None,
     after: tuple[int, int] | None = None,
     limit: int,
-) -> tuple[Sequence[PairRow], tuple[int, int] | None]:
+) -> tuple[Sequence[Row[*tuple[Any, ...]]], tuple[int, int] | None]:
     """Returns one page of the job's pair matrix, in order: in every iteration every pair, with all of its parts.
 
     Args:
@@ -359,22 +372,23 @@ def page(
         limit: at most this many pairs.
 
     Returns:
-        The rows, and what is ``after`` for the next page; None on the last page.
+        The columns of ``_OF_RESULTS``, and what is ``after`` for the next page; None on the last page. They are no rows of PairRow,
+        of which 5000 take a tenth of a second.
     """
     place = (PairRow.iteration, PairRow.pair_index)
-    query = select(PairRow).where(PairRow.job_id == job_id)
+    query = select(*_OF_RESULTS).where(PairRow.job_id == job_id)
     if iteration is not None:
         query = query.where(PairRow.iteration == iteration)
     if only is not None:
         query = query.where(PairRow.pair_index.in_(only))
     if after is not None:
         query = query.where(tuple_(*place) > tuple_(*after))
-    firsts = query.with_only_columns(*place).where(PairRow.part == 0).order_by(*place).limit(limit + 1)
-    places = [(row.iteration, row.pair_index) for row in session.execute(firsts)]
-    if len(places) > limit:
-        query = query.where(tuple_(*place) <= tuple_(*places[limit - 1]))
-    rows = session.scalars(query.order_by(*place, PairRow.part)).all()
-    return rows, places[limit - 1] if len(places) > limit else None
+    firsts = query.with_only_columns(*place).where(PairRow.part == 0).order_by(*place)
+    ends = session.execute(firsts.offset(limit - 1).limit(2)).all()
+    if len(ends) == 2:
+        query = query.where(tuple_(*place) <= tuple_(*ends[0]))
+    rows = session.execute(query.order_by(*place, PairRow.part)).all()
+    return rows, (ends[0].iteration, ends[0].pair_index) if len(ends) == 2 else None
 
 
 def states(session: Session, job_id: str, since: int) -> dict[int, dict[int, PairState]]:

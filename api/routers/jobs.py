@@ -10,12 +10,12 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from threading import Lock
-from typing import Annotated
+from typing import Annotated, Any
 
 from cachetools import TTLCache, cached
 from fastapi import APIRouter, Header, Query, Response, status
 from pydantic import Field
-from sqlalchemy import Engine
+from sqlalchemy import Engine, Row
 
 from api import held, submission, timeline
 from api.access import READ, SUBMIT, Admin, Db, Submitter
@@ -395,16 +395,22 @@ def _iteration(row: IterationRow) -> Iteration:
     )
 
 
-def _cell(scene: Scene, parts: Sequence[PairRow]) -> PairCell:
+def _cell(scene: Scene, parts: Sequence[PairRow | Row[Any]]) -> PairCell:
     """Describes a pair from its parts in their order: by its state from the first part of this state, and by sums of cells and seconds."""
-    state = pairs.state_of_parts([PairState(row.state) for row in parts])
-    row = next((row for row in parts if row.state == state), parts[0])
-    distances, seconds, cells = (
-        [value for part in parts if (value := getattr(part, name)) is not None] for name in ("margin", "seconds", "open_cells")
-    )
-    pair = scene.pairs[row.pair_index]  # What stands for a condition has no distance in metres.
-    certified = state is PairState.CERTIFIED and condition_named(pair.a, pair.b) is None
-    proved = min(distances) if distances and certified else None
+    row = parts[0]
+    if len(parts) == 1:
+        state, distance, seconds, cells = PairState(row.state), row.margin, row.seconds, row.open_cells
+    else:
+        state = pairs.state_of_parts([PairState(part.state) for part in parts])
+        row = next((part for part in parts if part.state == state), row)
+        distance, seconds, cells = (
+            of_known(known) if (known := [value for part in parts if (value := getattr(part, name)) is not None]) else None
+            for of_known, name in ((min, "margin"), (sum, "seconds"), (sum, "open_cells"))
+        )
+    proved = None
+    if state is PairState.CERTIFIED:
+        pair = scene.pairs[row.pair_index]  # What stands for a condition has no distance in metres.
+        proved = distance if condition_named(pair.a, pair.b) is None else None
     return PairCell(
         iteration=row.iteration,
         pair=row.pair_index,
@@ -413,11 +419,11 @@ def _cell(scene: Scene, parts: Sequence[PairRow]) -> PairCell:
         stage=None if row.stage is None else Stage(row.stage),
         proved_distance=proved,
         margin=proved,
-        seconds=sum(seconds) if seconds else None,
+        seconds=seconds,
         # What a search says of its open cells is about one part only.
         detail=None if len(parts) > 1 and state is PairState.INCONCLUSIVE else row.detail,
         worker=row.worker,
-        open_cells=sum(cells) if cells else None,
+        open_cells=cells,
         witness_q=None if row.witness_s is None else scene.to_q(row.witness_s).tolist(),
         proof=row.proof_digest,
     )

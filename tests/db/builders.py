@@ -82,4 +82,5 @@ def add_region(session: Session, job: JobRow, lower: float = -1.0, upper: float 
 
 def all_pairs(session: Session, job_id: str) -> Sequence[PairRow]:
     """The job's pairs with their parts, in the order of the iterations and of the scene's pairs."""
-    return pairs.page(session, job_id, limit=10**6)[0]
+    order = (PairRow.iteration, PairRow.pair_index, PairRow.part)
+    return session.scalars(select(PairRow).where(PairRow.job_id == job_id).order_by(*order)).all()
