@@ -143,7 +143,7 @@ def test_a_polytope_is_decided_cell_by_cell(upper: float, outcome: str) -> None:
         assert (s >= 0.4 - 1e-6) == (outcome == "refuted")
         assert s <= upper
     if outcome == "too_close":
-        assert f"{0.4 - s:.3g} m apart" in (first.detail or "")
+        assert f"are {1000 * (0.4 - s):.3g} mm apart" in (first.detail or "")
 
 
 def begun_whole_job() -> str:
