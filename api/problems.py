@@ -168,11 +168,12 @@ def respond(render: Render, request: Request, error: Exception) -> Response:
 
 
 def _validation(error: RequestValidationError) -> Problem:
-    for one in error.errors():
+    every = error.errors()
+    for one in every:
         raised = one.get("ctx", {}).get("error")
         if isinstance(raised, Exception):
             raised.__traceback__ = None  # its frames hold the body and this error, which holds it
-    found = error.errors()[:MOST_ERRORS]
+    found = every[:MOST_ERRORS]
     places = [_field((*e["loc"], "kind") if e["type"] in _TAGS else e["loc"]) for e in found]
     problems = [FieldProblem(field=shortened(at), message=shortened(_sentence(e))) for at, e in zip(places, found, strict=True)]
     if isinstance(error.body, bytes):

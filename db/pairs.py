@@ -384,11 +384,11 @@ def page(
     if after is not None:
         query = query.where(tuple_(*place) > tuple_(*after))
     firsts = query.with_only_columns(*place).where(PairRow.part == 0).order_by(*place)
-    ends = session.execute(firsts.offset(limit - 1).limit(2)).all()
-    if len(ends) == 2:
-        query = query.where(tuple_(*place) <= tuple_(*ends[0]))
-    rows = session.execute(query.order_by(*place, PairRow.part)).all()
-    return rows, (ends[0].iteration, ends[0].pair_index) if len(ends) == 2 else None
+    last_and_next = session.execute(firsts.offset(limit - 1).limit(2)).all()
+    end = (last_and_next[0].iteration, last_and_next[0].pair_index) if len(last_and_next) == 2 else None
+    if end is not None:
+        query = query.where(tuple_(*place) <= tuple_(*end))
+    return session.execute(query.order_by(*place, PairRow.part)).all(), end
 
 
 def states(session: Session, job_id: str, since: int) -> dict[int, dict[int, PairState]]:

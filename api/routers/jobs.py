@@ -66,8 +66,10 @@ MOST_PAIRS = 5000
 """One page of a pair matrix has at most this many results."""
 KEPT_SECONDS = 1.0
 """Which workers there are, and which jobs wait, is kept for this time."""
-_progress = Remembered[progress.Version, tuple[int, int]](2000)
-_labels = Remembered[str, dict[str, str]](2000)
+REMEMBERED = 2000
+"""The progress and the labels of this many jobs are remembered."""
+_progress = Remembered[progress.Version, tuple[int, int]](REMEMBERED)
+_labels = Remembered[str, dict[str, str]](REMEMBERED)
 
 IdempotencyKey = Annotated[str | None, Header(min_length=1, max_length=200, description="The same key and body give the same job.")]
 Label = Annotated[
@@ -398,7 +400,7 @@ def _iteration(row: IterationRow) -> Iteration:
 def _cell(scene: Scene, parts: Sequence[PairRow | Row[Any]]) -> PairCell:
     """Describes a pair from its parts in their order: by its state from the first part of this state, and by sums of cells and seconds."""
     row = parts[0]
-    if len(parts) == 1:
+    if len(parts) == 1:  # so it is with most pairs, of which a page has 5000
         state, distance, seconds, cells = PairState(row.state), row.margin, row.seconds, row.open_cells
     else:
         state = pairs.state_of_parts([PairState(part.state) for part in parts])
