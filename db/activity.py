@@ -8,14 +8,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
+from functools import cache
+from typing import Any
 
-from sqlalchemy import case, func, select
+from sqlalchemy import Select, func, select
 from sqlalchemy.orm import Session
 
-from db import clock, jobs, work, workers
+from db import clock, jobs, leases, work, workers
 from db.models import JobRow, PairRow, StepRow
 from db.session import all_projects
-from db.states import JOB, STEP, JobState, PairState, StepState, WorkerState, unfinished
+from db.states import JOB, STEP, JobState, WorkerState, unfinished
 from db.types import utcnow
 from db.workers import WorkerKind
 
@@ -35,11 +37,13 @@ class Kept:
 
     Attributes:
         clock_ahead: by how much the database's clock is before this machine's.
+        held: until when the work of a job is held at the latest, for the jobs of which some is.
         workers: what :func:`db.workers.counts` returns.
         ahead: the first jobs that wait for a worker of a kind.
     """
 
     clock_ahead: timedelta | None = None
+    held: dict[str, datetime] | None = None
     workers: dict[tuple[str, str], int] | None = None
     queue_silent: bool = False
     ahead: dict[WorkerKind, list[str]] = field(default_factory=dict)
@@ -57,7 +61,10 @@ def of_jobs(session: Session, rows: Sequence[JobRow], kept: Kept | None = None) 
     found_below = select(JobRow).where(JobRow.parent_id.in_(parents), JobRow.state.in_(unfinished(JOB)))
     children = session.scalars(found_below).all() if parents else ()
     below = of_jobs(session, children, kept) if children else {}
-    held, waiting = _held(session, alive)
+    if kept.held is None or any(row.running_pairs > 0 and row.id not in kept.held for row in alive):
+        kept.held = _held(session)
+    held = kept.held
+    waiting = _waiting(session, [row.id for row in alive if row.id not in held and row.open_pairs == 0])
     if kept.clock_ahead is None:
         kept.clock_ahead = clock.now(session) - utcnow()
     now = utcnow() + kept.clock_ahead
@@ -138,20 +145,24 @@ def missing(counts: dict[tuple[str, str], int], kind: WorkerKind) -> str | None:
     return f"all {said}s paused" if counts[kind, WorkerState.PAUSED] else f"no {said}"
 
 
-def _ids(rows: Sequence[JobRow]) -> list[str]:
-    return [row.id for row in rows]
-
-
-def _held(session: Session, rows: Sequence[JobRow]) -> tuple[dict[str, datetime], set[str]]:
-    """Returns until when a job's work is held at the latest, for the jobs of which some is, and the jobs with a step that has not ended."""
-    pairs = select(PairRow.job_id, func.max(PairRow.lease_until)).group_by(PairRow.job_id).where(PairRow.state == PairState.RUNNING)
-    with_pairs = [row.id for row in rows if row.running_pairs > 0]
-    until = session.execute(pairs.where(PairRow.job_id.in_(with_pairs))).all() if with_pairs else []
-    of_running = case((StepRow.state == StepState.RUNNING, StepRow.lease_until))  # a step that was given up has the time of its last lease
-    steps = select(StepRow.job_id, func.max(of_running)).where(StepRow.state.in_(unfinished(STEP))).group_by(StepRow.job_id)
-    of_steps = session.execute(steps.where(StepRow.job_id.in_(_ids(rows)))).all()
+def _held(session: Session) -> dict[str, datetime]:
+    """Returns until when the work of a job is held at the latest, for all jobs of which some is."""
     found: dict[str, datetime] = {}
-    for job_id, latest in (*until, *of_steps):
-        if latest is not None:
+    for query in _held_work():
+        for job_id, latest in session.execute(query):
             found[job_id] = max(latest, found.get(job_id, latest))
-    return found, {job_id for job_id, _ in of_steps}
+    return found
+
+
+@cache
+def _held_work() -> tuple[Select[str, Any], ...]:
+    kinds: tuple[type[PairRow] | type[StepRow], ...] = (PairRow, StepRow)
+    held = ((row, (row.state == leases.RUNNING, row.lease_until.is_not(None))) for row in kinds)
+    return tuple(select(row.job_id, func.max(row.lease_until)).where(*is_held).group_by(row.job_id) for row, is_held in held)
+
+
+def _waiting(session: Session, job_ids: Sequence[str]) -> set[str]:
+    """Returns which of these jobs have a step that has not ended."""
+    if not job_ids:
+        return set()
+    return set(session.scalars(select(StepRow.job_id).where(StepRow.job_id.in_(job_ids), StepRow.state.in_(unfinished(STEP)))))

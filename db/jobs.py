@@ -376,11 +376,15 @@ def awaiting_coordination(session: Session, now: datetime) -> list[str]:
     """Returns the ids of the unfinished jobs for which a coordination is due and that nobody coordinates.
 
     A coordination is due when the job is being cancelled, when its deadline has passed, or when it waits for no pair, no step and no child.
+    It is not due while a job that is to end waits for a solver to accept its region.
     """
     no_pair = and_(JobRow.open_pairs == 0, JobRow.running_pairs == 0)
     step = exists().where(StepRow.job_id == JobRow.id, StepRow.state.in_(unfinished(STEP)), StepRow.kind != ACCEPT)
     other = aliased(JobRow)
     child = exists().where(other.parent_id == JobRow.id, other.state.in_(unfinished(JOB)))
     due = or_(JobRow.state == JobState.CANCELLING, JobRow.deadline_at <= now, no_pair & ~step & ~child)
+    accepting = exists().where(StepRow.job_id == JobRow.id, StepRow.state.in_(unfinished(STEP)), StepRow.kind == ACCEPT)
+    ends = func.coalesce(JobRow.action["kind"].as_string(), "") == FINISH
+    due = and_(due, ~and_(ends, accepting, JobRow.accept_after <= now))
     rows = session.scalars(select(JobRow).where(JobRow.state.in_(unfinished(JOB)), due).order_by(JobRow.created_at))
     return [job.id for job in rows if not is_coordinated(job, now)]

@@ -23,7 +23,7 @@ import json
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,7 @@ from sqlalchemy import Connection, Dialect, Engine, QueuePool, create_engine, ev
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import DatabaseError, DisconnectionError, InterfaceError, OperationalError, TimeoutError
-from sqlalchemy.orm import DeclarativeBase, ORMExecuteState, Session, with_loader_criteria
+from sqlalchemy.orm import DeclarativeBase, LoaderCriteriaOption, ORMExecuteState, Session, with_loader_criteria
 
 from certifier.errors import CirisError, unreadable
 from db import unusable, version
@@ -77,7 +77,12 @@ def _only_own(state: ORMExecuteState) -> None:
     """Leaves the rows of other projects out of what a project's session finds or changes, also where they are joined or asked for by id."""
     project = project_of(state.session)
     if project is not None and (state.is_select or state.is_update or state.is_delete):
-        state.statement = state.statement.options(with_loader_criteria(Owned, lambda row: row.project == project, include_aliases=True))
+        state.statement = state.statement.options(_of_project(project))
+
+
+@lru_cache
+def _of_project(project: str) -> LoaderCriteriaOption:
+    return with_loader_criteria(Owned, lambda row: row.project == project, include_aliases=True)
 
 
 def project_of(session: Session) -> str | None:

@@ -4,7 +4,7 @@ A message to the solvers only says that there is work. Which work it is, this mo
 project whose work the fewest solvers do now, however many keys and jobs the project has; within it to the key of which the same is
 true; within the key to the job that was served least. So a newcomer gets the next solver that is free, however long pieces of others
 take. Of projects for which as many solvers work, that one goes first for which they worked least lately (db.solver_time), and so it is
-with the keys of a project. While no solver is free, a process beside them does pieces of new jobs.
+with the keys of a project. While no solver is free, a process beside them does pieces of new jobs, and accepts regions of all jobs.
 
 ``jobs.served`` counts the seconds that a job was given, divided by its share. The job with the least goes next (stride scheduling:
 Waldspurger, Weihl 1995). Each step of priority doubles a job's share of its key's work.
@@ -19,6 +19,7 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from datetime import timedelta
 from functools import cache
+from typing import Literal
 
 from sqlalchemy import ColumnElement, Row, Select, and_, bindparam, case, exists, func, or_, select
 from sqlalchemy.orm import Session, aliased
@@ -75,7 +76,7 @@ def _sorted(
     return sorted(found, key=turn)
 
 
-def newcomer(session: Session, *, instead_of: str | None = None) -> str | None:
+def newcomer(session: Session, *, instead_of: str | None = None, accepts: bool = False) -> str | None:
     """Returns the id of the new job that gets a process beside the solvers, while they do other work; None when there is none.
 
     It is the first in the order of work among those of which no solver does anything. A step that was begun before is left to the solvers.
@@ -83,18 +84,20 @@ def newcomer(session: Session, *, instead_of: str | None = None) -> str | None:
 
     Args:
         instead_of: the job that has this process. The process goes on to a newer job, or to one of a project or key for which fewer work.
+        accepts: whether the process accepts a region of that job for :func:`to_accept`. Then it goes on to any new job.
     """
     now = utcnow()
     since = now - timedelta(seconds=NEW_SECONDS)
-    found = session.execute(_placed(new=True), {"now": now, "since": since, "places": 1, "most": MOST_KEYS}).all()
+    found = session.execute(_placed("new"), {"now": now, "since": since, "places": 1, "most": MOST_KEYS}).all()
     if not found:
         return None
-    of_project, of_key = held = _held(session)
-    waiting = session.execute(_placed(), {"now": now, "places": 1, "most": MOST_KEYS}).all()
-    least = min(of_project[project] for project in {*of_project, *(one.project for one in waiting)})
-    may = [one for one in _sorted(session, found, *held) if of_project[one.project] <= least]
+    of_project, of_key = _held(session)
     mine = session.execute(select(JobRow.project, JobRow.key_id, JobRow.created_at).where(JobRow.id == instead_of)).one_or_none()
-    if mine is not None:
+    if mine is not None and accepts:  # new jobs get this process as if it were free
+        of_project[mine.project] -= 1
+        of_key[mine.project, mine.key_id] -= 1
+    may = _beside(session, found, of_project, of_key)
+    if mine is not None and not accepts:
         newer = set(session.scalars(select(JobRow.id).where(JobRow.id.in_([one.id for one in may]), JobRow.created_at > mine.created_at)))
 
         def before(one: Placed) -> bool:
@@ -104,6 +107,26 @@ def newcomer(session: Session, *, instead_of: str | None = None) -> str | None:
 
         may = [one for one in may if before(one)]
     return next((one.id for one in may), None)
+
+
+def to_accept(session: Session) -> str | None:
+    """Returns the id of the job of which a process beside the solvers accepts a region, while no new job waits; None when there is none.
+
+    It is the first in the order of work. A region that somebody has begun to accept before is left to the solvers. A project for which
+    more solvers work than for another one that has work gets no process, as in :func:`newcomer`.
+    """
+    found = session.execute(_placed("region"), {"now": utcnow(), "places": 1, "most": MOST_KEYS}).all()
+    return next((one.id for one in _beside(session, found, *_held(session))), None) if found else None
+
+
+def _beside(
+    session: Session, found: Sequence[Placed], of_project: defaultdict[str, float], of_key: Counter[tuple[str, str | None]]
+) -> Sequence[Placed]:
+    """Returns the jobs, in the order of work, that may have a process beside the solvers: those of projects with the fewest solvers."""
+    waiting = session.execute(_placed(), {"now": utcnow(), "places": 1, "most": MOST_KEYS}).all()
+    with_work = {one.project for one in waiting} | {project for project, solvers in of_project.items() if solvers > 0}
+    least = min(of_project[project] for project in with_work)
+    return [one for one in _sorted(session, found, of_project, of_key) if of_project[one.project] <= least]
 
 
 def others_wait(session: Session, job_id: str) -> bool:
@@ -145,11 +168,22 @@ def claim(
     claimed: pairs.Claim | steps.Claim | None = None
     if job.state == JobState.RUNNING:
         claimed = steps.claim(session, job, accepts=False, lease_seconds=lease_seconds, fresh=fresh)
-    if claimed is None and session.scalar(_has_region_now(), {"job": job_id, "now": utcnow()}):
-        claimed = steps.claim(session, job, accepts=True, lease_seconds=lease_seconds)
+    if claimed is None:
+        claimed = _claim_region(session, job, lease_seconds)
     if claimed is None and job.state == JobState.RUNNING:
         claimed = pairs.claim(session, job, lease_seconds=lease_seconds, batch_seconds=batch_seconds)
     return claimed
+
+
+def claim_region(session: Session, job_id: str, *, lease_seconds: float) -> steps.Claim | None:
+    """Claims the job's latest region to accept. It returns None when others were faster, or have begun one of them before."""
+    return _claim_region(session, jobs.lock(session, job_id), lease_seconds, fresh=True)
+
+
+def _claim_region(session: Session, job: JobRow, lease_seconds: float, *, fresh: bool = False) -> steps.Claim | None:
+    if session.scalar(_has_region_now(fresh), {"job": job.id, "now": utcnow()}) is None:
+        return None
+    return steps.claim(session, job, accepts=True, lease_seconds=lease_seconds)
 
 
 def to_give_up(session: Session) -> leases.Lost | None:
@@ -226,20 +260,24 @@ _NOW = bindparam("now", type_=Utc())
 
 
 @cache
-def _placed(new: bool = False) -> Select[tuple[str, str, str | None, int]]:
+def _placed(of: Literal["work", "new", "region"] = "work") -> Select[tuple[str, str, str | None, int]]:
     """Returns the query for the jobs of each key in the order in which they are served: the one served least, and of several the newest.
 
     So a job that has just started gets its first piece at once, also beside a hundred of the same key.
 
     Args:
-        new: whether only new jobs of which no solver does anything are among them, and steps that were begun before count as no work. The
-            newest goes first whatever it was served, so that a small job goes on to its end beside others that wait.
+        of: which jobs are among them. ``new``: new ones of which no solver does anything, and steps that were begun before count as no
+            work; the newest goes first whatever it was served, so that a small job goes on to its end beside others that wait.
+            ``region``: those with a region to accept that nobody has begun before. ``work``: all that have work.
     """
     newest = (JobRow.created_at.desc(), JobRow.id)
-    order = newest if new else (JobRow.served, *newest)
+    order = newest if of == "new" else (JobRow.served, *newest)
     place = func.row_number().over(partition_by=(JobRow.project, JobRow.key_id), order_by=order).label("place")
-    work = and_(_is_new(), _has_work(fresh=True), ~_has_solver()) if new else _has_work()
-    placed = select(JobRow.id, JobRow.project, JobRow.key_id, place).where(work).subquery()
+    if of == "new":
+        among = and_(_is_new(), _has_work(fresh=True), ~_has_solver())
+    else:
+        among = _has_region(fresh=True) if of == "region" else _has_work()
+    placed = select(JobRow.id, JobRow.project, JobRow.key_id, place).where(among).subquery()
     columns = (placed.c.id, placed.c.project, placed.c.key_id, placed.c.place)
     return select(*columns).where(placed.c.place <= bindparam("places")).order_by(placed.c.place).limit(bindparam("most"))
 
@@ -255,8 +293,8 @@ def _least_served() -> Select[float]:
 
 
 @cache
-def _has_region_now() -> Select[str]:
-    return select(JobRow.id).where(JobRow.id == bindparam("job"), _has_region())
+def _has_region_now(fresh: bool) -> Select[str]:
+    return select(JobRow.id).where(JobRow.id == bindparam("job"), _has_region(fresh=fresh))
 
 
 def _is_new() -> ColumnElement[bool]:
@@ -279,9 +317,14 @@ def _has_work(*, fresh: bool = False) -> ColumnElement[bool]:
     return or_(and_(JobRow.state == JobState.RUNNING, or_(JobRow.open_pairs > 0, step)), _has_region())
 
 
-def _has_region() -> ColumnElement[bool]:
-    """Returns the condition that the job has a region to accept, has rested, and nobody is accepting one of its regions."""
+def _has_region(*, fresh: bool = False) -> ColumnElement[bool]:
+    """Returns the condition that the job has a region to accept, has rested, and nobody is accepting one of its regions.
+
+    Args:
+        fresh: whether nobody has begun one of those before, either.
+    """
     step, other = aliased(StepRow), aliased(StepRow)
     waits = exists().where(steps.is_open(step, JobRow.id, accepts=True))
-    accepting = exists().where(other.job_id == JobRow.id, other.kind == ACCEPT, other.state == StepState.RUNNING)
-    return and_(JobRow.state.in_((JobState.RUNNING, JobState.CANCELLING)), JobRow.accept_after <= _NOW, waits, ~accepting)
+    begun = and_(other.state.in_((StepState.OPEN, StepState.RUNNING)), other.attempts > 0) if fresh else other.state == StepState.RUNNING
+    taken = exists().where(other.job_id == JobRow.id, other.kind == ACCEPT, begun)
+    return and_(JobRow.state.in_((JobState.RUNNING, JobState.CANCELLING)), JobRow.accept_after <= _NOW, waits, ~taken)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from certifier.errors import CirisError, SceneError
-from db import events, jobs, proofs, regions, scenes
+from db import events, jobs, proofs, regions, scenes, steps
 from db.models import JobRow, ProofRow, SceneRow
 from db.session import Database
-from db.states import JobState
+from db.states import JobState, StepState
 from db.types import utcnow
 from tests.db.builders import a_job, a_running_job, a_scene
 from tests.scenes import slider
@@ -195,7 +195,16 @@ def test_a_job_that_awaits_coordination_is_found(db: Database) -> None:
         overdue.deadline_at = now - timedelta(seconds=1)
         held = a_job(session)
         held.coordinator, held.coordinator_until = "elsewhere:1:1", now + timedelta(seconds=60)
-        due = {queued.id, idle.id, cancelling.id, overdue.id}
+        ending, accepted, late = (a_running_job(session, pair_count=0) for _ in range(3))
+        for job in (ending, accepted, late):
+            step, job.accept_after = steps.add(session, job, "accept", {}), now
+            jobs.next_turn(job, jobs.finishing("certified", "done"))
+            if job is accepted:
+                step.state = StepState.DONE
+        late.accept_after = now + timedelta(seconds=60)  # its end has to be told not to wait for the next region
+        goes_on = a_running_job(session, pair_count=0)
+        steps.add(session, goes_on, "accept", {})
+        due = {queued.id, idle.id, cancelling.id, overdue.id, accepted.id, late.id, goes_on.id}
         assert busy.state == JobState.RUNNING
     with db.read() as session:
         assert set(jobs.awaiting_coordination(session, now)) == due
