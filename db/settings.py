@@ -20,7 +20,7 @@ from certifier.errors import CirisError
 from db import machine
 
 SPARE = 1
-"""A solve worker has this many processes more than work at a time. They do pieces of new jobs (workers.spare)."""
+"""A solve worker has this many processes more than work at a time. They do pieces of new jobs, and accept regions (workers.spare)."""
 
 
 def _data_dir() -> Path:

@@ -37,7 +37,7 @@ from db.transaction import Afterwards, persistently
 from db.types import utcnow
 from jobs import admission, obstacles
 from jobs.former import former_of
-from jobs.kind import Done, Held, Kind, Turn, in_child, report_of
+from jobs.kind import Done, Held, Kind, Turn, between_parts, in_child, report_of
 from jobs.scenes import load_scene
 from workers.app import send_work
 
@@ -197,7 +197,8 @@ def _accept(claim: steps.Claim, scene: Scene) -> Done:
 
     state, held, account = persistently(read)
     proposal = None if state.start is None else _sampled_proposal(claim.scene_id, claim.job_id)
-    region = growing.make_region(scene, state, candidate, held, account, proposal, former_of(scene, state.options))
+    former = former_of(scene, state.options)
+    region = growing.make_region(scene, state, candidate, held, account, proposal, former, progress=between_parts)
 
     def save(session: Session, job: JobRow) -> None:
         regions.add(session, job, candidate.iteration, region.manifest, region.summary, region.proof)

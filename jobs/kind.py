@@ -233,7 +233,7 @@ def _wait_until_loaded(function: str, look: Callable[[], None]) -> None:
 
 
 class GivesWay(Exception):
-    """A step is given up while its child computes. It begins anew when it is its job's turn."""
+    """A step is given up while its child computes, or while it verifies. It begins anew when it is its job's turn."""
 
 
 _look: ContextVar[Callable[[], None]] = ContextVar("look", default=lambda: None)
@@ -241,9 +241,21 @@ _look: ContextVar[Callable[[], None]] = ContextVar("look", default=lambda: None)
 
 @contextmanager
 def giving_way(look: Callable[[], None]) -> Iterator[None]:
-    """Calls ``look`` every second that a step waits for a child within the block. It raises GivesWay when the step is to be given up."""
+    """Calls ``look`` every second that a step waits for a child within the block, and wherever the step calls :func:`between_parts`.
+
+    It raises GivesWay when the step is to be given up.
+    """
     token = _look.set(look)
     try:
         yield
     finally:
         _look.reset(token)
+
+
+def between_parts(done: int, total: int) -> None:
+    """Lets a step give way that verifies in this process: it is a ``progress`` of :mod:`certifier.verify`.
+
+    Raises:
+        GivesWay: what :func:`giving_way` was given has raised it.
+    """
+    _look.get()()

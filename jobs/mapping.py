@@ -40,7 +40,7 @@ from db.settings import settings
 from db.states import LEAD, StepState, WorkerState
 from db.transaction import persistently
 from jobs.failures import not_begun
-from jobs.kind import Done
+from jobs.kind import Done, between_parts
 from jobs.scenes import load_scene
 from workers.app import send_work
 
@@ -305,7 +305,7 @@ def accept(claim: steps.Claim, scene: Scene) -> Done:
             for entry in unpack_entries(scene, data):
                 trees.tree(entry.pairs).take(entry.nodes, entry.found)
     proof, cells = trees.proof().to_bytes(), _cells_of(trees)
-    statement, file = verify_map(proof), _free_set_of(proof)
+    statement, file = verify_map(proof, progress=between_parts), _free_set_of(proof)
     states = states_of(trees, in_s(scene, options.at))
     report = {
         "cells": statement.cells,

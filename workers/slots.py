@@ -1,4 +1,4 @@
-"""A solve worker has a slot for each process that it runs at a time. It has one process more, which takes only what new jobs wait for.
+"""A solve worker has a slot for each process that it runs at a time. It has one process more, for new jobs and regions (workers.spare).
 
 Slots are locks that the kernel keeps for a process, so that one that dies leaves its slot.
 """

@@ -37,7 +37,7 @@ def carry_out(claim: steps.Claim) -> bool:
         try:
             state, done = StepState.DONE, _do(claim)
         except GivesWay:
-            give_up(leases.Lost(claim.job_id, claim.token, leases.this_worker(), "other new jobs waited", alone=False))
+            give_up(leases.Lost(claim.job_id, claim.token, leases.this_worker(), "new jobs waited", alone=False))
             return False
         except CirisError as error:
             state, done = StepState.FAILED, Done(error.to_document())

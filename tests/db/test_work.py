@@ -209,6 +209,26 @@ def claimed_step(db: Database, job_id: str) -> steps.Claim:
     return claim
 
 
+def a_seeding(db: Database, key: str, project: str = DEFAULT_PROJECT) -> steps.Claim:
+    """A job whose seeding a solver does."""
+    job_id = a_job_of(db, key, pair_count=0, project=project)
+    a_step(db, job_id)
+    return claimed_step(db, job_id)
+
+
+def a_region(db: Database, job_id: str) -> None:
+    """Gives the job a region to accept."""
+    with db.write() as session:
+        job = jobs.lock(session, job_id)
+        job.turn += 1
+        steps.add(session, job, "accept", {})
+
+
+def claimed_region(db: Database, job_id: str) -> steps.Claim | None:
+    with db.write() as session:
+        return work.claim_region(session, job_id, lease_seconds=60)
+
+
 def given_up(db: Database) -> leases.Lost | None:
     with db.read() as session:
         return work.to_give_up(session)
@@ -248,6 +268,22 @@ def test_no_step_is_given_up_twice(db: Database) -> None:
             leases.release(session, StepRow, lost)
         claimed_step(db, lost.job_id)
     assert given_up(db) is None
+
+
+def test_of_the_steps_of_a_project_accepting_is_given_up_last(db: Database) -> None:
+    """It may have the process beside the solvers, so that nobody would get a solver by it."""
+    told(db, processes=2)
+    seeds = [a_seeding(db, f"key{i}") for i in range(2)]
+    a_region(db, seeds[1].job_id)
+    accepting = claimed_region(db, seeds[1].job_id)
+    assert accepting is not None
+    a_job_of(db, "one", project="others", pair_count=4)
+    for claim in (seeds[1], seeds[0], accepting):
+        lost = given_up(db)
+        assert lost is not None
+        assert lost.token == claim.token
+        with db.write() as session:
+            session.get_one(StepRow, claim.step_id).attempts = 2
 
 
 def test_a_project_keeps_the_only_solver_that_it_has(db: Database) -> None:
@@ -368,6 +404,98 @@ def test_new_jobs_do_not_go_before_the_work_of_a_project_that_has_no_solver(db: 
     with db.write() as session:
         jobs.lock(session, waits).claimed_at = utcnow() - timedelta(seconds=work.NEW_SECONDS)
     assert newcomer(db) is None
+
+
+def to_accept(db: Database) -> str | None:
+    with db.read() as session:
+        return work.to_accept(session)
+
+
+def test_a_region_is_accepted_beside_the_solvers_while_its_job_seeds(db: Database) -> None:
+    job_id = a_seeding(db, "a").job_id
+    assert to_accept(db) is None
+    a_region(db, job_id)
+    assert (newcomer(db), to_accept(db)) == (None, job_id)
+    first = claimed_region(db, job_id)
+    assert first is not None
+    assert first.kind == "accept"
+    a_region(db, job_id)
+    assert (to_accept(db), claimed_region(db, job_id)) == (None, None), "one region at a time"
+    with db.write() as session:
+        assert steps.save(session, first, StepState.DONE, {}, 1.0)
+        jobs.lock(session, job_id).accept_after = utcnow() + timedelta(seconds=60)
+    assert (to_accept(db), claimed_region(db, job_id)) == (None, None), "the job rests"
+    with db.write() as session:
+        jobs.lock(session, job_id).accept_after = utcnow()
+    assert to_accept(db) == job_id
+
+
+def test_nothing_but_a_region_is_done_beside_the_solvers_for_a_job_that_is_not_new(db: Database) -> None:
+    job_id = a_job_of(db, pair_count=4)
+    with db.write() as session:
+        jobs.lock(session, job_id).claimed_at = utcnow() - timedelta(seconds=work.NEW_SECONDS)
+    assert (to_accept(db), claimed_region(db, job_id)) == (None, None)
+    a_step(db, job_id)
+    a_region(db, job_id)
+    assert to_accept(db) == job_id
+    claim = claimed_region(db, job_id)
+    assert claim is not None
+    assert claim.kind == "accept"
+
+
+def test_a_region_that_was_begun_before_is_left_to_the_solvers(db: Database) -> None:
+    job_id = a_seeding(db, "a").job_id
+    a_region(db, job_id)
+    claim = claimed_region(db, job_id)
+    assert claim is not None
+    with db.write() as session:
+        leases.release(session, StepRow, leases.Lost(job_id, claim.token, "", "", alone=False))
+    a_region(db, job_id)
+    assert (to_accept(db), claimed_region(db, job_id)) == (None, None), "nor is another one begun, after which the job would rest"
+    with db.read() as session:
+        assert work.next_job(session) == job_id
+    assert claimed_step(db, job_id).kind == "accept"
+
+
+def test_regions_of_a_project_that_has_more_solvers_than_another_wait(db: Database) -> None:
+    first, second = a_seeding(db, "a0", "a"), a_seeding(db, "a1", "a")
+    other = a_seeding(db, "b0", "b")
+    a_region(db, first.job_id)
+    assert to_accept(db) is None
+    a_region(db, other.job_id)
+    assert to_accept(db) == other.job_id
+    with db.write() as session:
+        assert steps.save(session, second, StepState.DONE, {}, 1.0)
+        jobs.finish(session, jobs.lock(session, second.job_id), JobState.FAILED, reason="")
+    assert to_accept(db) == first.job_id, "both have as many"
+
+
+def test_a_region_that_is_accepted_beside_the_solvers_keeps_no_new_job_waiting(db: Database) -> None:
+    """Its project has a process more than the other one then. A step of a new job would keep newer ones of the same project waiting."""
+
+    def instead(of: str, accepts: bool) -> str | None:
+        with db.read() as session:
+            return work.newcomer(session, instead_of=of, accepts=accepts)
+
+    mine = a_seeding(db, "a0", "a").job_id
+    a_seeding(db, "b0", "b")
+    a_region(db, mine)
+    older = a_job_of(db, "a1", project="a")
+    with db.write() as session:
+        jobs.lock(session, older).created_at = utcnow() - timedelta(seconds=30)
+    assert claimed_region(db, mine) is not None
+    assert instead(mine, accepts=True) == older
+    assert instead(mine, accepts=False) is None
+
+
+def test_a_project_for_which_only_a_region_is_accepted_keeps_no_new_job_of_others_waiting(db: Database) -> None:
+    mine = a_job_of(db, "a0", pair_count=0, project="a")
+    a_region(db, mine)
+    a_seeding(db, "b0", "b")
+    new = a_job_of(db, "b1", project="b")
+    assert claimed_region(db, mine) is not None
+    with db.read() as session:
+        assert work.newcomer(session, instead_of=mine, accepts=True) == new
 
 
 def test_a_job_gets_its_first_piece_at_once_beside_a_hundred_of_its_key(db: Database) -> None:

@@ -6,6 +6,7 @@ import os
 import signal
 import time
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from sqlalchemy.exc import OperationalError
 
 from certifier.growth.options import GrowthOptions
 from certifier.jobs.local import grow
+from certifier.map.options import MapOptions
 from certifier.model import Scene
 from db import jobs, leases, pairs, steps, workers
 from db.models import JobRow, StepRow, WorkerRow
@@ -32,6 +34,7 @@ from tests.workers.service import ended, events_of, eventually, job_of, running_
 from workers import spare
 from workers.app import SOLVE, waiting
 from workers.slots import Slots
+from workers.solver import Piece, do, work
 from workers.spare import work_for_newcomer
 from workers.turns import coordinate
 
@@ -81,7 +84,7 @@ def test_a_small_job_ends_before_the_seedings_that_have_all_processes(
         assert ended(small).outcome == "certified"
         assert seeding(first) is not None
         assert seeding(second) is not None
-        assert lost(third) == ["other new jobs waited"]
+        assert lost(third) == ["new jobs waited"]
         assert lost(first) == lost(second) == []
         for job in (first, second, third):
             assert ended(job).outcome == "certified"
@@ -132,6 +135,11 @@ def no_wait(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spare, "LOOK_SECONDS", 0.05)
 
 
+def not_new(job_id: str) -> None:
+    with database().write() as session:
+        session.execute(update(JobRow).where(JobRow.id == job_id).values(claimed_at=job_of(job_id).created_at.replace(year=2000)))
+
+
 @pytest.mark.usefixtures("no_wait")
 def test_without_a_slot_only_what_new_jobs_wait_for_is_done(job_id: str, own_queue: Queue) -> None:
     own_queue.flush()
@@ -141,8 +149,7 @@ def test_without_a_slot_only_what_new_jobs_wait_for_is_done(job_id: str, own_que
     assert waiting(SOLVE) == 1, "the message is there for others"
     other = submit(slider(posts=3), box_around([0.0], 0.2))
     coordinate(other)
-    with database().write() as session:
-        session.execute(update(JobRow).where(JobRow.id == other).values(claimed_at=job_of(other).created_at.replace(year=2000)))
+    not_new(other)
     assert work_for_newcomer(Slots(0)) is None, "the job is not new any more"
 
 
@@ -164,14 +171,91 @@ def test_a_step_that_it_gave_up_is_not_begun_again_for_a_region_that_waits(job_i
     assert work_for_newcomer(Slots(0)) is None
 
 
+def accepting(job_id: str) -> StepRow | None:
+    with database().read() as session:
+        return session.scalar(select(StepRow).where(StepRow.job_id == job_id, StepRow.kind == "accept"))
+
+
+def until_it_accepts(job_id: str) -> None:
+    """Takes the job to where all that is left is to verify and store what it has found."""
+    while accepting(job_id) is None:
+        piece = work()
+        assert piece is not None
+        coordinate(piece.job_id)
+
+
+@pytest.mark.usefixtures("no_wait")
+def test_without_a_slot_a_region_of_any_job_is_accepted_while_no_new_job_waits(job_id: str, own_queue: Queue) -> None:
+    until_it_accepts(job_id)
+    not_new(job_id)
+    other = submit(slider(posts=3), box_around([0.0], 0.2))
+    coordinate(other)
+    own_queue.flush()
+    new = work_for_newcomer(Slots(0))
+    assert new is not None
+    assert new.job_id == other
+    own_queue.flush()
+    assert work_for_newcomer(Slots(0)) == Piece(job_id, True)
+    assert waiting(SOLVE) == 1, "the message is there for others"
+    coordinate(job_id)
+    assert job_of(job_id).region_id is not None
+    assert work_for_newcomer(Slots(0)) is None
+
+
+A_MAP: dict[str, Any] = {**asdict(MapOptions(coverage=0.5)), "former": None}
+
+
+def comes_meanwhile(new: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The new job is there as soon as the process has claimed something."""
+
+    def do_meanwhile(claim: pairs.Claim | steps.Claim) -> Piece:
+        coordinate(new)
+        return do(claim)
+
+    monkeypatch.setattr(spare, "do", do_meanwhile)
+
+
+@pytest.mark.usefixtures("no_wait", "here")
+@pytest.mark.parametrize("lasts", [False, True], ids=["short", "long"])
+@pytest.mark.parametrize(("of", "options"), [("certify", box_around([0.0], 0.1)), ("map", A_MAP)], ids=["region", "map"])
+def test_what_it_accepts_is_left_to_the_others_when_it_lasts_and_a_new_job_waits(
+    of: str, options: dict[str, Any], lasts: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(spare, "TRIAL_SECONDS", 0.0 if lasts else 60.0)
+    old = submit(slider(posts=3), options, of)
+    coordinate(old)
+    until_it_accepts(old)
+    not_new(old)
+    new = submit(slider(posts=3), box_around([0.0], 0.2))
+    comes_meanwhile(new, monkeypatch)
+    assert work_for_newcomer(Slots(0)) == Piece(old, not lasts)
+    step = accepting(old)
+    assert step is not None
+    assert (step.state, step.attempts, lost(old)) == (("open", 1, ["new jobs waited"]) if lasts else ("done", 1, []))
+    assert {piece.job_id for piece in iter(lambda: work_for_newcomer(Slots(0)), None)} == {new}
+    assert (work() == Piece(old, True)) == lasts, "the solvers do it"
+
+
+@pytest.mark.usefixtures("no_wait")
+def test_a_region_of_a_new_job_is_accepted_to_the_end(job_id: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is the end of a small job, and all others may do long work."""
+    monkeypatch.setattr(spare, "TRIAL_SECONDS", 0.0)
+    until_it_accepts(job_id)
+    comes_meanwhile(submit(slider(posts=3), box_around([0.0], 0.2)), monkeypatch)
+    assert work_for_newcomer(Slots(0)) == Piece(job_id, True)
+    step = accepting(job_id)
+    assert step is not None
+    assert (step.state, lost(job_id)) == ("done", [])
+
+
 def test_a_short_outage_of_the_database_fails_no_step(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spare, "TRIAL_SECONDS", 0.0)
-    trial = spare._Trial(Slots(0), "the job")
-    monkeypatch.setattr(spare.work, "newcomer", lambda session, instead_of: "another job")
+    trial = spare._Trial(Slots(0), "the job", is_new=True)
+    monkeypatch.setattr(spare.work, "newcomer", lambda session, instead_of, accepts: "another job")
     with pytest.raises(GivesWay):
         trial()
 
-    def gone(session: object, instead_of: str) -> str:
+    def gone(session: object, instead_of: str, accepts: bool) -> str:
         raise OperationalError("", None, Exception("the server closed the connection"))
 
     monkeypatch.setattr(spare.work, "newcomer", gone)
