@@ -130,8 +130,8 @@ def test_a_map_of_the_service_is_that_of_this_machine_and_answers_questions(mach
         assert free.contains([0.2, -0.4])
         assert service.map_proof(job) == (machine.directory / "local.proof").read_bytes()
         assert service.contains("planar-2dof", [0.2, -0.4])[0].map
-        early = service.map("planar-2dof", former=service.job(job), coverage=1.0)
-        assert (bool(early), early.ended) == (False, "nothing_left")
+        early = service.map("planar-2dof", former=service.job(job), coverage=1.0, deadline=3)
+        assert (bool(early), early.ended) == (False, "deadline")
     page = httpx2.get(f"{machine.url}/jobs/{job}").text
     for words in ("Configurations wanted first", f"/v1/jobs/{job}/map/free-set"):
         assert words in page
