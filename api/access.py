@@ -36,7 +36,7 @@ KEYS_SECONDS = 1.0
 """A key or session that was read from the database is trusted for this many seconds."""
 PATIENCE_SECONDS = 0.3
 """A request of monitoring waits this many seconds for the keys."""
-AGAIN_SECONDS = 0.1
+AGAIN_SECONDS = 0.03
 """When requests bring unknown keys or sessions, the database is read at most once in this many seconds, however many requests there are."""
 LATELY_SECONDS, TOGETHER = 30.0, 500
 """Of the keys and sessions that were used within LATELY_SECONDS, the last TOGETHER are read again with any other."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import http.client
 import json
 import os
 import secrets
@@ -29,6 +28,7 @@ from db.keys import Scope
 from db.models import DEFAULT_PROJECT, ApiKeyRow, PairRow, StepRow
 from db.session import Database
 from db.types import utcnow
+from tests.api.latency import latencies
 from tests.api.test_hostile_uploads import URDF, zipped
 from tests.api.test_places import LINK
 from tests.db.builders import a_scene, add_pairs
@@ -59,23 +59,6 @@ def a_service(data: Path, url: str, solvers: int = 1) -> Iterator[str]:
             stack.send_signal(signal.SIGINT)
 
 
-def latencies(url: str, key: str) -> dict[str, float]:
-    """Quantiles of the milliseconds that a request takes, of REQUESTS over some 15 s."""
-    connection = http.client.HTTPConnection(url.removeprefix("http://"), timeout=60)
-    seconds = []
-    for _ in range(REQUESTS):
-        began = time.perf_counter()
-        connection.request("GET", "/v1/project", headers={"Authorization": f"Bearer {key}"})
-        answer = connection.getresponse()
-        answer.read()
-        assert answer.status == 200
-        seconds.append(time.perf_counter() - began)
-        time.sleep(0.02)
-    connection.close()
-    seconds.sort()
-    return {f"p{100 * part:g}": 1e3 * seconds[int(part * (REQUESTS - 1))] for part in (0.5, 0.9, 0.99, 1.0)}
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("database", ["sqlite", "postgresql"])
 def test_keys_of_another_project_cost_nothing(database: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
@@ -89,15 +72,15 @@ def test_keys_of_another_project_cost_nothing(database: str, tmp_path: Path, req
         projects.add(session, "flood")
         key, flooding = keys.add(session, "quiet", Scope.READ), keys.add(session, "flooding", Scope.ADMIN, "flood")
     with a_service(tmp_path / "data", url) as service:
-        latencies(service, key)  # the first requests load what the others find loaded
-        before = latencies(service, key)
+        latencies(service, key, REQUESTS)  # the first requests load what the others find loaded
+        before = latencies(service, key, REQUESTS)
         many = [
             {"id": secrets.token_hex(6), "project": "flood", "name": f"k{i}", "digest": "", "scope": "read", "created_at": utcnow()}
             for i in range(KEYS)
         ]
         with db.write() as session:
             session.execute(insert(ApiKeyRow), many)
-        after = latencies(service, key)
+        after = latencies(service, key, REQUESTS)
         with Client(service, flooding) as client, pytest.raises(CirisError, match="the most that it may have"):
             client.add_key("more", "read")
     db.close()
@@ -119,15 +102,12 @@ def all_the_time(
                 answered[ask(client).status_code] += 1
 
     threads = [threading.Thread(target=repeat, args=(keys_of_others[i % len(keys_of_others)],)) for i in range(clients)]
-    interval = sys.getswitchinterval()
-    sys.setswitchinterval(1e-4)  # the latencies of the other client are those of the service, and not of this process
     for thread in threads:
         thread.start()
     time.sleep(5)
     try:
         yield answered
     finally:
-        sys.setswitchinterval(interval)
         over.set()
         for thread in threads:
             thread.join()
@@ -196,10 +176,10 @@ def test_the_work_of_another_project_costs_requests_little(
     db.close()
     with a_service(tmp_path / "data", url, solvers=2) as service, Client(service, own) as client:
         client.add_scene(EXAMPLES / "planar_2dof" / "scene.yaml")
-        latencies(service, own)
-        before = latencies(service, own)
+        latencies(service, own, REQUESTS)
+        before = latencies(service, own, REQUESTS)
         with attack(service, theirs) as answered:
-            after, began = latencies(service, own), time.monotonic()
+            after, began = latencies(service, own, REQUESTS), time.monotonic()
             client.add_scene(EXAMPLES / "planar_2dof" / "scene.yaml")
             upload_seconds = time.monotonic() - began
     print(
