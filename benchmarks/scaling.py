@@ -16,7 +16,7 @@ from benchmarks.measure import Progress
 from benchmarks.svg import Panel, draw
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Array, Geometry, Pair, Scene
-from certifier.pair.closest import closest
+from certifier.polytopes.closest import closest
 
 OBSTACLES = (10, 30, 100, 300, 1000)
 JOINTS = range(2, 8)

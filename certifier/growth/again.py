@@ -19,8 +19,8 @@ from certifier.growth.whole import REVOKED, begin_stage, in_words
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Array, Pair, Polytope, Scene, Volume
 from certifier.outcome import Outcome
-from certifier.pair.closest import closest
 from certifier.pair.collisions import touching
+from certifier.polytopes.closest import closest
 from certifier.proof.negative import WitnessProof
 from certifier.verify.witness import check_witness
 

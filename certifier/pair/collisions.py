@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Geometry, Scene, Volume
-from certifier.pair.closest import closest
+from certifier.polytopes.closest import closest
 
 
 def in_collision(scene: Scene, s: Array, room: float = 0.0) -> NDArray[np.bool_]:

@@ -8,8 +8,8 @@ import numpy as np
 
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Polytope, Volume
-from certifier.pair.closest import first_within
 from certifier.pair.frames import Frame
+from certifier.polytopes.closest import first_within
 
 SCREEN_SAMPLES = 64
 NEAREST_JOINTS = 4

@@ -24,7 +24,6 @@ from certifier.kinematics import Kinematics
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Outcome, Stage
 from certifier.pair.broad_phase import BroadPhase, Volumes
-from certifier.pair.closest import closest
 from certifier.pair.result import PairResult, Weakness
 from certifier.partition.again import try_again
 from certifier.partition.area import Area
@@ -37,6 +36,7 @@ from certifier.partition.shared import Shared
 from certifier.partition.subtrees import Subtrees, dealt, open_cells, put_together
 from certifier.partition.together import Together, volumes_of
 from certifier.partition.tree import Node, OpenCell, to_streams
+from certifier.polytopes.closest import closest
 from certifier.polytopes.proved import ProvedBox
 from certifier.polytopes.simplex import deepest
 from certifier.proof.negative import WitnessProof

@@ -24,8 +24,8 @@ from certifier.growth.paper.options import PaperOptions
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD
 from certifier.outcome import Outcome, Stage
-from certifier.pair.closest import closest
 from certifier.pair.result import PairResult
+from certifier.polytopes.closest import closest
 from certifier.scene import load_scene
 from certifier.verify.scene import check_scene
 from tests.client.conftest import surroundings

@@ -14,7 +14,7 @@ from certifier.kinematics import Kinematics
 from certifier.model import WORLD
 from certifier.outcome import Outcome
 from certifier.pair.certification import Certification
-from certifier.pair.closest import closest
+from certifier.polytopes.closest import closest
 
 REGION = json.loads(pictures.REGION.read_text(encoding="utf-8"))
 

@@ -9,7 +9,7 @@ from scipy.stats import binom
 
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Pair
-from certifier.pair.closest import closest
+from certifier.polytopes.closest import closest
 from certifier.proof.motion import Motion, Space
 from tests.certifier.scenes import ball, planar_arm
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Pair, Scene
-from certifier.pair.closest import closest
+from certifier.polytopes.closest import closest
 from certifier.polytopes.polytope import chebyshev_center
 from certifier.polytopes.sampling import hit_and_run
 

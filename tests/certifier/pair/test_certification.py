@@ -9,7 +9,7 @@ from certifier.errors import RegionError
 from certifier.model import WORLD, JointKind
 from certifier.outcome import Outcome, Stage
 from certifier.pair.certification import Certification, certify_pair
-from certifier.pair.closest import closest
+from certifier.polytopes.closest import closest
 from certifier.proof.pair import PairProof
 from certifier.verify.pair import verify_pair
 from tests.certifier.scenes import box, cube, obstacle, planar_arm

@@ -13,7 +13,6 @@ from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Polytope
 from certifier.outcome import Outcome, Stage
 from certifier.pair.certification import certify_pair
-from certifier.pair.closest import first_within
 from certifier.partition import bodies, certification
 from certifier.partition.area import Area
 from certifier.partition.certification import CellCertification, CutOff
@@ -23,6 +22,7 @@ from certifier.partition.shared import Shared
 from certifier.partition.subtrees import open_cells
 from certifier.partition.together import volumes_of
 from certifier.partition.tree import OPEN
+from certifier.polytopes.closest import first_within
 from certifier.polytopes.gibbs import uniform_in_q
 from certifier.polytopes.proved import ProvedBox
 from certifier.proof.container import pack, unpack

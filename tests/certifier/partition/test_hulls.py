@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Volume
-from certifier.pair.closest import closest
 from certifier.partition.hulls import approach, gap, gaps, hull, place
+from certifier.polytopes.closest import closest
 from tests.certifier.scenes import box, planar_arm, random_tree
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from certifier.pair.closest import closest
+from certifier.polytopes.closest import closest
 from certifier.polytopes.polytope import Polytope, chebyshev_center
 from certifier.polytopes.sampling import hit_and_run
 from certifier.proof.map import MapProof

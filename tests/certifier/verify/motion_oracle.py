@@ -18,7 +18,7 @@ import numpy as np
 from flint import arb, ctx, fmpq
 from scipy.spatial.transform import Rotation
 
-from certifier.pair.closest import closest
+from certifier.polytopes.closest import closest
 from certifier.verify.kinematics import rigid, unit
 
 TIMES = 24
