@@ -1,12 +1,16 @@
-"""Which pairs of a scene touch at configurations is asked of Drake here."""
+"""Which pairs of a scene touch at configurations, for advice about scenes: Drake says what overlaps, closest points what is near.
+
+Drake's signed distances are not asked: :mod:`certifier.collisions.clearance` says why.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from pydrake.geometry import QueryObject
+from pydrake.geometry import GeometryId, QueryObject
 
 from certifier.model import Array, Pair, Scene
+from certifier.polytopes.closest import closest
 from certifier.scene.drake_model import InDrake, build_diagram, geometry_name
 
 
@@ -16,13 +20,7 @@ def touching(scene: Scene, configurations: Iterable[Array]) -> Iterator[set[Pair
     for query in _queries(scene, configurations):
         found = set(_depths(query))
         ids = {geometry_name(query.inspector(), g): g for g in query.inspector().GetAllGeometryIds()} if padded else {}
-        for pair in padded:
-            # Drake gives up on the distance of some bodies that are deep in each other.
-            if pair not in found:
-                distance = query.ComputeSignedDistancePairClosestPoints(ids[pair.a], ids[pair.b]).distance
-                if distance <= 2 * scene.padding_of(pair):
-                    found.add(pair)
-        yield found
+        yield found | {pair for pair in padded if pair not in found and _near(scene, pair, query, ids)}
 
 
 def overlaps(scene: Scene, configurations: Iterable[Array]) -> Iterator[dict[Pair, float]]:
@@ -39,6 +37,18 @@ def _queries(scene: Scene, configurations: Iterable[Array]) -> Iterator[QueryObj
     for q in configurations:
         plant.SetPositions(plant_context, own.at(q))
         yield scene_graph.get_query_output_port().Eval(scene_graph.GetMyContextFromRoot(context))
+
+
+def _near(scene: Scene, pair: Pair, query: QueryObject, ids: dict[str, GeometryId]) -> bool:
+    """Returns whether no direction shows that two bodies are farther apart than their padding."""
+    bodies, reach = [], 2 * scene.padding_of(pair)
+    for name in (pair.a, pair.b):
+        geometry, frame = scene.geometry(name), query.inspector().GetFrameId(ids[name])
+        bodies.append(query.GetPoseInWorld(frame).multiply(geometry.vertices.T).T)
+        reach += geometry.radius
+    A, B = bodies
+    along_axes = max((A.min(axis=0) - B.max(axis=0)).max(), (B.min(axis=0) - A.max(axis=0)).max())
+    return not along_axes > reach and not closest(A, B).gap > reach
 
 
 def _depths(query: QueryObject) -> dict[Pair, float]:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.geometry import QueryObject
 
 from certifier.broken import not_kept
+from certifier.collisions.clearance import Clearance
 from certifier.errors import RegionError
 from certifier.model import Array, Pair, Scene
-from certifier.scene.drake_model import InDrake, build_diagram, geometry_name
 from certifier.scene.hollow import beyond, remedy, standing_for
 
 SHELLS, EACH = np.geomspace(0.004, 1.0, 12), 40
@@ -21,50 +20,6 @@ WIDTHS, NEARER = np.geomspace(1.0, 0.05, 10), 0.97
 """Ways that leave the known one by these widths are tried EACH times: is a configuration free at this part of the distance already?"""
 STEPS = 8
 """What was found is moved back towards the seed in this many steps of bisection."""
-
-
-class Clearance:
-    """Tells how far apart the pairs of a scene are, by Drake."""
-
-    def __init__(self, scene: Scene) -> None:
-        self._scene = scene
-        self._diagram = build_diagram(scene)
-        self._own = InDrake(scene, self._diagram.plant())
-        self._context = self._diagram.CreateDefaultContext()
-        inspector = self._diagram.scene_graph().model_inspector()
-        self._ids = {geometry_name(inspector, g): g for g in inspector.GetAllGeometryIds()}
-        self._reaches = {frozenset((self._ids[p.a], self._ids[p.b])): 2 * scene.padding_of(p) for p in scene.pairs}
-
-    def least(self, q: Array) -> tuple[float, Pair]:
-        """Returns the least distance of the padded bodies of a pair at q, (n,), in metres, and the pair.
-
-        It is minus infinity where Drake cannot tell how deep two bodies are in each other.
-        """
-        query, ids = self._query(q), self._ids
-        least, nearest = np.inf, self._scene.pairs[0]
-        for pair in self._scene.pairs:
-            try:
-                apart = query.ComputeSignedDistancePairClosestPoints(ids[pair.a], ids[pair.b]).distance
-            except RuntimeError:  # Drake gives up on some bodies that are deep in each other.
-                return -np.inf, pair
-            if (distance := apart - 2 * self._scene.padding_of(pair)) < least:
-                least, nearest = distance, pair
-        return float(least), nearest
-
-    def free(self, q: Array, room: float = 0.0) -> bool:
-        """Returns whether all pairs are farther apart at q, (n,), than twice the padding and the room, in metres."""
-        try:
-            near = self._query(q).ComputeSignedDistancePairwiseClosestPoints(2 * self._scene.largest_padding + room)
-        except RuntimeError:  # as above
-            return False
-        return all(pair.distance > self._reaches[frozenset((pair.id_A, pair.id_B))] + room for pair in near)
-
-    def _query(self, q: Array) -> QueryObject:
-        self._diagram.plant().SetPositions(self._diagram.mutable_plant_context(self._context), self._own.at(q))
-        found: QueryObject = (
-            self._diagram.scene_graph().get_query_output_port().Eval(self._diagram.mutable_scene_graph_context(self._context))
-        )
-        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,8 +62,7 @@ def check_free(scene: Scene, q: Array, field: str) -> Nearest:
     room, found = next((one for one in searched if one[1] is not None), (0.0, None))
     condition = not_kept(scene, pair, q)
     if condition is None:
-        overlap = f"overlap by {-distance:.3g} m" if np.isfinite(distance) else "overlap"
-        how = overlap if distance <= 0 else f"are {distance:.3g} m apart, with a padding of {padding:g} m on each"
+        how = f"overlap by {-distance:.3g} m" if distance <= 0 else f"are {distance:.3g} m apart, with a padding of {padding:g} m on each"
         message, hint = f"{pair.a} and {pair.b} {how}", "move the seed, or ignore the pair in the scene"
         if distance <= 0:
             message += _hollow(scene, pair)

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from certifier.collisions.clearance import Clearance
 from certifier.conditions import condition_named
 from certifier.model import Pair, Scene
-from certifier.seeding.free import Clearance, Nearest, named, nearest_free, written
+from certifier.seeding.free import Nearest, named, nearest_free, written
 from certifier.seeding.limits import too_long
 from certifier.seeding.proposal import NO_ROOM
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from certifier.broken import not_kept
+from certifier.collisions.clearance import Clearance
 from certifier.model import Array, Scene
-from certifier.seeding.free import ROOM, Clearance, nearest_free
+from certifier.seeding.free import ROOM, nearest_free
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,14 +33,14 @@ class InCollision:
 
     Attributes:
         a, b: the geometries.
-        depth: how deep the padded bodies are in each other, metres; None where Drake cannot tell.
+        depth: how deep the padded bodies are in each other, metres.
         free: (n,) the nearest free joint positions that were found; None where none were.
         condition: in words, which condition is not kept, if the two geometries stand for one.
     """
 
     a: str
     b: str
-    depth: float | None
+    depth: float
     free: Array | None
     condition: str | None = None
 
@@ -55,12 +56,12 @@ def outside_limits(scene: Scene, q: Array) -> OutsideLimits | None:
 
 
 def in_collision(scene: Scene, q: Array) -> InCollision:
-    """Returns which pair is deepest in collision at q, (n,), where one is. This builds a Drake model, which takes a while."""
+    """Returns which pair is deepest in collision at q, (n,), where one is."""
     clearance = Clearance(scene)
     distance, pair = clearance.least(q)
     searched = (nearest_free(scene, clearance, scene.in_windows(q), room) for room in ROOM)
     free = next((found for found in searched if found is not None), None)
-    return InCollision(pair.a, pair.b, -distance if np.isfinite(distance) else None, free, not_kept(scene, pair, q))
+    return InCollision(pair.a, pair.b, -distance, free, not_kept(scene, pair, q))
 
 
 def turned(scene: Scene, start: Array, goal: Array) -> list[Array]:

@@ -11,6 +11,7 @@ import pytest
 from pydrake.geometry import QueryObject
 
 from certifier.carry.carry import carry
+from certifier.collisions.clearance import Clearance
 from certifier.collisions.free import free_at_all
 from certifier.collisions.seen import seen_of
 from certifier.errors import CirisError, ProofError, SceneError
@@ -41,7 +42,7 @@ from certifier.scene.contacts import touching as overlapping
 from certifier.scene.drake_model import build_diagram, geometry_name
 from certifier.seeding.coarse_pairs import with_coarse_pairs
 from certifier.seeding.drake_iris import checker
-from certifier.seeding.free import Clearance, check_free
+from certifier.seeding.free import check_free
 from certifier.verify.dual import verify_dual
 from certifier.verify.file import verify_file
 from certifier.verify.motion import verify_motion
@@ -109,7 +110,9 @@ def test_all_that_says_what_is_free_means_the_same_distances():
     assert [drakes.CheckConfigCollisionFree(x) for x in q] == free.tolist()
     for x, row in zip(q[:60], distances[:60], strict=True):
         least, pair = clearance_.least(x)
-        assert (least, pair) == (pytest.approx(row.min(), abs=1e-6), scene.pairs[int(row.argmin())])
+        assert least <= row.min() + 1e-6, "Drake's distances may be too large"
+        if row.min() < 0:
+            assert (least, pair) == (pytest.approx(row.min(), abs=1e-6), scene.pairs[int(row.argmin())])
     for x, row in zip(q[~free][:5], distances[~free][:5], strict=True):
         assert deepest(scene, x).depth == pytest.approx(-row.min(), abs=1e-6)
         with pytest.raises(CirisError, match=r"overlap|padding of"):

@@ -11,9 +11,9 @@ import pytest
 from certifier.errors import RegionError
 from certifier.model import Array, Scene
 from certifier.scene.parse import parse
-from certifier.seeding.free import Clearance
 from certifier.seeding.options import Method, SeedOptions
 from certifier.seeding.propose import propose
+from tests.oracles.clearance import DrakesClearance
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TRIES, STEPS = 60, 100
@@ -31,7 +31,7 @@ def refusal(scene: Scene, a: Array, b: Array) -> str:
 @pytest.mark.parametrize("name", ["planar_2dof", "arm_3dof", "ur3e_bin"])
 def test_drake_finds_contact_where_a_line_is_refused_and_none_where_it_is_not(name: str) -> None:
     scene = Scene.from_document(parse({"path": str(EXAMPLES / name / "scene.yaml")}))
-    drake, rng, refused = Clearance(scene), np.random.default_rng(0), 0
+    drake, rng, refused = DrakesClearance(scene), np.random.default_rng(0), 0
     for _ in range(TRIES):
         a, b = [q for q in rng.uniform(scene.q_lower, scene.q_upper, (300, scene.n)) if drake.free(q, 1e-3)][:2]
         said = refusal(scene, a, b)

@@ -9,13 +9,13 @@ import pytest
 
 from certifier.model import WORLD, Array, Scene
 from certifier.pair.collisions import in_collision
-from certifier.seeding.free import Clearance
 from planner.advice import seed_near
 from planner.cover.ground import sees
 from planner.library import Library
 from planner.membership import locate
 from tests.certifier.scenes import box as body
 from tests.certifier.scenes import planar_arm
+from tests.oracles.clearance import DrakesClearance
 from tests.planner.regions import box, library
 
 FAR = library(box("far", (50.0, 50.0), (51.0, 51.0)))
@@ -31,7 +31,7 @@ def advised(scene: Scene, there: Library, q: Array) -> Array | None:
 
 
 def test_a_seed_is_free_as_it_is_printed_and_near_what_was_wanted(scene: Scene) -> None:
-    drake, rng, moved = Clearance(scene), np.random.default_rng(0), 0
+    drake, rng, moved = DrakesClearance(scene), np.random.default_rng(0), 0
     for q in rng.uniform(scene.q_lower, scene.q_upper, (200, scene.n)):
         found = advised(scene, FAR, q)
         assert found is not None

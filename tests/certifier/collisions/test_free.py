@@ -12,8 +12,8 @@ from certifier.collisions.seen import seen_of
 from certifier.motion.bodies import bodies_of
 from certifier.pair.collisions import in_collision
 from certifier.scene import load_scene
-from certifier.seeding.free import Clearance
 from tests.certifier.mixed import mixed_arm
+from tests.oracles.clearance import DrakesClearance
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 ROUNDED = 1e-6
@@ -36,7 +36,7 @@ def order_of(scene):
 def test_configurations_are_free_where_drake_says_so(name):
     scene = example(name)
     q = np.random.default_rng(3).uniform(scene.q_lower, scene.q_upper, (60, scene.n))
-    free, clearance = free_at_all(*known(scene), q, order_of(scene)), Clearance(scene)
+    free, clearance = free_at_all(*known(scene), q, order_of(scene)), DrakesClearance(scene)
     for i in range(len(q)):
         distance = clearance.least(q[i])[0]
         if abs(distance) > ROUNDED:
@@ -75,7 +75,7 @@ def test_padding_keeps_bodies_farther_apart():
     free, padded = (free_at_all(*known(scene, padding), q, order_of(scene)) for padding in (0.0, 0.05))
     assert not (padded & ~free).any()
     assert (free & ~padded).any()
-    clearance = Clearance(scene)
+    clearance = DrakesClearance(scene)
     assert all(clearance.least(x)[0] > 0.1 - ROUNDED for x in q[padded][:30])
 
 

@@ -12,11 +12,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from certifier.collisions.clearance import Clearance
 from certifier.errors import CirisError
 from certifier.growth.options import GrowthOptions
 from certifier.jobs.local import grow
 from certifier.model import Array, Scene
-from certifier.seeding.free import Clearance
 from certifier.seeding.hindrance import NEAR
 from certifier.seeding.propose import check_seed
 from tests.certifier.mixed import mixed_arm

@@ -10,10 +10,10 @@ from certifier.model import Pair
 from certifier.scene.contacts import touching
 from certifier.scene.drake_model import build_diagram, drake_name, geometry_name, scene_name
 from certifier.seeding.drake_iris import drake_iris
-from certifier.seeding.free import Clearance
 from certifier.seeding.options import Method, SeedOptions
 from tests.certifier.scene.test_load import assert_same_kinematics, original
 from tests.certifier.scene.workshop import parsed, write
+from tests.oracles.clearance import DrakesClearance
 
 NESTED = """<sdf version="1.9"><model name="room"><link name="walls"/><model name="i"><link name="l">
   <collision name="c:d:"><pose>0.6 0 0.3 0 0 0</pose><geometry><box><size>0.1 1 1</size></box></geometry></collision></link>
@@ -51,7 +51,7 @@ def test_a_region_grows_beside_a_model_in_a_model(path):
     scene = parsed(path)
     pair = Pair("arm/hand/palm", "room::i/l/c:d:")
     assert pair in scene.pairs
-    apart, nearest = Clearance(replace(scene, pairs=(pair,))).least(np.zeros(scene.n))
+    apart, nearest = DrakesClearance(replace(scene, pairs=(pair,))).least(np.zeros(scene.n))
     assert (apart, nearest) == (pytest.approx(0.2), pair)
     assert list(touching(scene, [np.zeros(scene.n)])) == [set()]
     options = SeedOptions(Method.IRIS_NP2, max_iterations=1, max_iterations_separating_planes=3)

@@ -19,11 +19,11 @@ from certifier.errors import RegionError
 from certifier.growth.options import GrowthOptions
 from certifier.jobs.local import grow
 from certifier.scene import load_scene
-from certifier.seeding.free import Clearance
 from certifier.seeding.hindrance import hindrance
 from certifier.seeding.options import Method, SeedOptions
 from certifier.seeding.propose import check_seed, propose
 from tests.certifier.seeding.test_propose import clearance, crane
+from tests.oracles.clearance import DrakesClearance
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 BEFORE, BESIDE, BEHIND = (1.5, 0.8), (1.8, 0.8), (1.5, 2.3)
@@ -118,7 +118,7 @@ def test_a_contact_in_the_middle_of_points_that_see_one_another_is_refused(metho
     """Each side of this triangle is free, and Drake finds the post within it."""
     scene = load_scene(EXAMPLES / "planar_2dof/scene.yaml")
     corners = np.array([(-1.7072, -1.5029), (1.4046, -2.0546), (-1.3543, 2.3956)])
-    drake, s = Clearance(scene), scene.to_s(corners)
+    drake, s = DrakesClearance(scene), scene.to_s(corners)
     for a, b in combinations(s, 2):
         assert all(drake.free(scene.to_q(x)) for x in a + np.linspace(0, 1, 200)[:, None] * (b - a))
     seed = {"method": method, "q": corners[0].tolist(), "contain": corners[1:].tolist(), **OPTIONS[method]}

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from certifier.seeding.free import Clearance
 from planner.poses.inverse import APART, inverse
 from planner.poses.reach import TIGHT
+from tests.oracles.clearance import DrakesClearance
 from tests.planner.poses import arms
 
 ARMS = ("iiwa_shelf", "ur3e_bin", "dual_ur3e", "planar_2dof", "gantry", "endless")
@@ -67,7 +67,7 @@ def test_a_pose_out_of_reach_is_said_to_be_with_the_nearest(name, seed):
 @given(st.sampled_from(("iiwa_shelf", "ur3e_bin")), st.integers(0, 2**32 - 1))
 def test_only_free_configurations_are_returned(name, seed):
     arm, rng = arms.arm(name), np.random.default_rng(seed)
-    drake = Clearance(arm.scene)
+    drake = DrakesClearance(arm.scene)
     free = next(q for q in (arm.random(rng) for _ in range(10_000)) if drake.free(q))
     found = inverse(arm.scene, arm.frame, *arms.given(arm.pose(free)), arm.random(rng), drake.free, seconds=60)
     assert found.reason is None
@@ -77,7 +77,7 @@ def test_only_free_configurations_are_returned(name, seed):
 def test_a_pose_in_the_shelf_is_in_collision_in_all_ways():
     """The last link in the upper board; its twin without collisions is reached."""
     arm = arms.arm("iiwa_shelf")
-    drake, start = Clearance(arm.scene), np.array([0, 0.3, 0, -1.5, 0, 0.9, 0])
+    drake, start = DrakesClearance(arm.scene), np.array([0, 0.3, 0, -1.5, 0, 0.9, 0])
     asked = (arm.scene, "link_7", [0.76, 0, 0.61], [0, np.pi / 2, 0], start)
     found, twin = inverse(*asked, drake.free), inverse(*asked, everywhere)
     assert (found.reason, len(found.q)) == ("in_collision", 0)

@@ -17,12 +17,12 @@ from certifier.proof.container import with_scene
 from certifier.proof.motion import MotionProof, Space
 from certifier.scene import load_scene
 from certifier.scene.drake_model import build_diagram
-from certifier.seeding.free import Clearance
 from certifier.verify.file import verify_file
 from certifier.verify.motion import verify_motion
 from planner.sampling.child import planned
 from planner.tubes import Tube, follows
 from tests.certifier.scenes import ball, box, planar_arm
+from tests.oracles.clearance import DrakesClearance
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 
@@ -54,7 +54,7 @@ def check(scene, found, speed=1.0, acceleration=2.0):
         assert (np.abs(np.diff(velocity, axis=0) / between) <= acceleration).all()
     dense = np.concatenate([a + np.linspace(0, 1, 20)[:, None] * (b - a) for a, b in pairwise(q)])
     assert not in_collision(scene, scene.to_s(dense)).any()
-    clearance = Clearance(scene)
+    clearance = DrakesClearance(scene)
     assert all(clearance.least(x)[0] > 0 for x in dense[:: max(1, len(dense) // 50)])
 
 
@@ -145,9 +145,9 @@ def test_what_touches_is_named_with_a_free_place_near_by(points, goals, where):
     scene = planar_arm(1, post)
     found = ask(scene, points, goals)
     assert (found["reason"], found["where"], {found["a"], found["b"]}) == ("in_collision", where, {"arm/link1/bar", "world/post"})
-    depth = -Clearance(scene).least(np.array([1.0]))[0]
+    depth = -DrakesClearance(scene).least(np.array([1.0]))[0]
     assert found["depth"] == pytest.approx(depth)
-    assert Clearance(scene).free(found["free"])
+    assert DrakesClearance(scene).free(found["free"])
     beyond = ask(scene, *(np.where(np.array(given) == 1.0, 2.5, given) for given in (points, goals)))
     assert (beyond["reason"], beyond["where"], beyond["joint"]) == ("outside_limits", where, "arm/joint1")
     assert (beyond["value"], beyond["lower"], beyond["upper"]) == (2.5, -2.0, 2.0)
