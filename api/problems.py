@@ -103,7 +103,7 @@ class Problem(BaseModel):
                     "type": "urn:ciris:problem:seed_outside_limits",
                     "title": "Unprocessable Content",
                     "status": 422,
-                    "detail": "joint arm/elbow is at 9, not between its limits -2 and 2",
+                    "detail": "joint arm/elbow is at 9 rad, not between its limits -2 and 2 rad",
                     "code": "seed_outside_limits",
                     "field": "seed.q[1]",
                     "hint": "move it between them",

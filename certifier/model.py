@@ -193,6 +193,11 @@ class Scene(ConfigurationSpace):
         return tuple(sorted((j for j in self.joints if j.index is not None and not j.follows), key=lambda j: j.index or 0))
 
     @cached_property
+    def units(self) -> tuple[Literal["rad", "m"], ...]:
+        """Returns the units of the n joint positions."""
+        return tuple(joint.unit for joint in self.moving)
+
+    @cached_property
     def following(self) -> tuple[Joint, ...]:
         """Returns the joints that move with another one."""
         return tuple(j for j in self.joints if j.follows)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from certifier.outcome import Guarantee, Outcome
+from certifier.words import counted
 from ciris.documents import Document
 from ciris.space import Array, Straight
 
@@ -47,7 +48,7 @@ class Answers(Sequence[T]):
         return all(self._items)
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({sum(map(bool, self._items))} of {len(self._items)}, about {self.regions} regions)"
+        return f"{type(self).__name__}({sum(map(bool, self._items))} of {len(self._items)}, about {counted(self.regions, 'region')})"
 
 
 @dataclass(frozen=True)
@@ -196,7 +197,7 @@ class Coverage:
 
     def __repr__(self) -> str:
         where = "covered" if self.uncovered is None else f"not covered from {self.uncovered.time:.6g} on"
-        return f"Coverage({where}, {len(self.pieces)} pieces)"
+        return f"Coverage({where}, {counted(len(self.pieces), 'piece')})"
 
 
 class Segments(Answers[Coverage]):
@@ -262,7 +263,8 @@ class Graph:
     """The job that has grown the scene's latest map; None where the scene has none."""
 
     def __repr__(self) -> str:
-        return f"Graph({len(self.nodes)} regions, {len(self.edges)} overlaps, {self.components} components)"
+        has = (counted(len(self.nodes), "region"), counted(len(self.edges), "overlap"), counted(self.components, "component"))
+        return f"Graph({', '.join(has)})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -382,7 +384,8 @@ class Plan:
     def __repr__(self) -> str:
         if not self.found:
             return f"Plan({self.reason})"
-        return f"Plan({len(self.q)} configurations, {self.length:.4g} long, {self.duration:.4g} s, {len(self.pieces)} pieces)"
+        has, pieces = counted(len(self.q), "configuration"), counted(len(self.pieces), "piece")
+        return f"Plan({has}, {self.length:.4g} long, {self.duration:.4g} s, {pieces})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -565,7 +568,7 @@ class Map:
 
     def __repr__(self) -> str:
         proved = "nothing known" if self.coverage is None else f"{100 * self.coverage.value:.3g} % proved"
-        return f"Map({proved}, {self.cells} cells, {self.reason})"
+        return f"Map({proved}, {counted(self.cells, 'cell')}, {self.reason})"
 
 
 @dataclass(frozen=True)
@@ -597,7 +600,7 @@ class Cover:
 
     def __repr__(self) -> str:
         covered = "nothing known" if self.coverage is None else f"{100 * self.coverage.value:.3g} % covered"
-        return f"Cover({covered}, {len(self.regions)} regions, {self.reason})"
+        return f"Cover({covered}, {counted(len(self.regions), 'region')}, {self.reason})"
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from certifier.errors import CirisError, RegionError, unreadable
+from certifier.words import counted
 from ciris.space import Array, InSpace, Space, frozen
 
 FORMAT, BEFORE = 2, 1
@@ -135,7 +136,7 @@ class FreeSet(InSpace):
         return found
 
     def __repr__(self) -> str:
-        return f"<FreeSet of {self.name}: {len(self.clauses)} groups of pairs, {len(self._cells.nodes)} cuts>"
+        return f"<FreeSet of {self.name}: {counted(len(self.clauses), 'group')} of pairs, {counted(len(self._cells.nodes), 'cut')}>"
 
     def contains(self, q: ArrayLike) -> NDArray[np.bool_]:
         """Returns which configurations are proved to be free, (..., n) -> (...).
@@ -252,8 +253,9 @@ class FreeSet(InSpace):
             outside = np.flatnonzero((q < self.space.q_lower) | (q > self.space.q_upper))
             if len(outside):
                 i = outside[0]
-                hint = f"its limits are {self.space.q_lower[i]:.9g} and {self.space.q_upper[i]:.9g}"
-                raise RegionError("outside_limits", f"{self.joints[i]} is {q[i]:.9g}, beyond its limits", field=field, hint=hint)
+                unit = "rad" if self.space.revolute[i] else "m"
+                hint = f"its limits are {self.space.q_lower[i]:.9g} and {self.space.q_upper[i]:.9g} {unit}"
+                raise RegionError("outside_limits", f"{self.joints[i]} is {q[i]:.9g} {unit}, beyond its limits", field=field, hint=hint)
         return rows[0], ends[0]
 
     def _ends(self, start: ArrayLike, end: ArrayLike) -> tuple[Array, Array, Array]:

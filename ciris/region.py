@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from certifier.outcome import Guarantee
+from certifier.words import counted
 from ciris.answers import NotCovered, QVolume, Share
 from ciris.documents import SHORT, Document
 from ciris.reading import values
@@ -70,7 +71,8 @@ class RegionData(InSpace):
 
     def __repr__(self) -> str:
         size = f", {self.q_volume.value:.3g} {self.q_volume.unit}" if self.q_volume else ""
-        return f"Region({self.id[:SHORT]} of {self.scene_name}: {len(self.joints)} joints, {len(self.d)} faces{size}, {self.guarantee})"
+        has = f"{counted(len(self.joints), 'joint')}, {counted(len(self.d), 'face')}"
+        return f"Region({self.id[:SHORT]} of {self.scene_name}: {has}{size}, {self.guarantee})"
 
 
 def region_fields(document: Document) -> dict[str, Any]:

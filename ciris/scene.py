@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from certifier.words import counted
 from ciris.answers import NotCovered
 from ciris.documents import Document, asked_as, named
 from ciris.reading import read
@@ -43,7 +44,8 @@ class Scene(InSpace):
         return hash(self.id)
 
     def __repr__(self) -> str:
-        return f"Scene({self.name!r}, {self.id}: {len(self.joints)} joints, {self.geometries} geometries, {self.pairs} pairs)"
+        has = (counted(len(self.joints), "joint"), counted(self.geometries, "geometry", "geometries"), counted(self.pairs, "pair"))
+        return f"Scene({self.name!r}, {self.id}: {', '.join(has)})"
 
     @classmethod
     def of(cls, document: Document, given: str | None = None) -> Scene:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import base64
 from argparse import Namespace
+from collections.abc import Sequence
 from typing import Any
 
 from certifier.names import escaped
 from certifier.verify.decimals import at_least_mm
+from certifier.words import joint_positions
 from client import output
 from client.files import ProofFile, check_writable
 from client.verify import in_child
@@ -26,23 +28,23 @@ def clearance(args: Namespace) -> int:
         check_writable(args.out)
         kept = ProofFile(args.out)
     found = in_child("certifier.jobs.clearance:clearance_in_child", args.proof)
-    proof = found.pop("proof")
+    proof, units = found.pop("proof"), found.pop("units")
     written = None if kept is None or proof is None else str(kept.write(found["scene"]["name"], base64.b64decode(proof)))
     if args.json:
         output.print_json({**found, "proof": written})
     else:
-        _print(found, written, proved_by_region=proof is None)
+        _print(found, units, written, proved_by_region=proof is None)
     return TIGHT if found["tight"] else NOT_TIGHT
 
 
-def _print(found: dict[str, Any], written: str | None, proved_by_region: bool) -> None:
+def _print(found: dict[str, Any], units: Sequence[str], written: str | None, proved_by_region: bool) -> None:
     nearest = found["nearest"]
     facts = [
         ("region", f"of {found['scene']['name']} ({found['scene']['hash'][:16]})"),
         ("clearance", f"at least {at_least_mm(found['clearance'])}, padded, proved at every configuration of the region"),
         ("", found["not_covered_summary"]),
         ("closest", f"{nearest['a']} - {nearest['b']}, {1000 * nearest['distance']:.6g} mm apart"),
-        ("", f"q = {', '.join(f'{value:.6g}' for value in nearest['q'])}"),
+        ("", f"q = {joint_positions(nearest['q'], units)}"),
     ]
     if not found["tight"]:
         facts.append(("note", "the two numbers are farther apart than 10 % and 0.1 mm; nothing larger could be proved"))

@@ -13,6 +13,7 @@ from certifier.errors import CirisError
 from certifier.outcome import Outcome
 from certifier.verify.decimals import at_most_mm, exactly
 from certifier.verify.uncovered import named
+from certifier.words import joint_positions
 from ciris.documents import Document
 from client import output, service
 from client.files import ProofFile, check_writable
@@ -88,9 +89,10 @@ def scene_show(args: Namespace) -> int:
         print_json({**scene, "lint": lint, "pair_list": pairs})
         return OK
     print(f"{scene['name']} ({scene['id']}), padding {exactly(scene['padding'])} m")
-    rows = [(j["name"], j["kind"], f"{j['lower']:.4f}", f"{j['upper']:.4f}", f"{j['q_star']:.4f}") for j in scene["positions"]]
+    units = service.units(scene)
+    rows = [(j["name"], j["kind"], *(f"{j[of]:.4f} {units[j['name']]}" for of in ("lower", "upper", "q_star"))) for j in scene["positions"]]
     output.print_table(("joint", "kind", "lower", "upper", "q*"), rows, right="lower upper q*")
-    output.print_configurations(scene["configurations"])
+    output.print_configurations(scene["configurations"], units)
     print()
     costs = [
         (
@@ -201,10 +203,11 @@ def certify(args: Namespace) -> int:
         from client import local
 
         refuse_of_service(args)
-        document, proof = local.certify(args.scene, polytope, asked, screen, args.watch, drake, kept is not None)
+        document, units, proof = local.certify(args.scene, polytope, asked, screen, args.watch, drake, kept is not None)
     else:
         with service.connect(args.url) as client:
-            document = service.certify(client, service.known_scene(client, args.scene), polytope, asked, screen, args.watch)
+            known = service.known_scene(client, args.scene)
+            document, units = service.certify(client, known, polytope, asked, screen, args.watch), [*service.units(known).values()]
             proof = client.proof(document["region"]) if kept is not None and document["region"] else None
     path = None if kept is None or proof is None else kept.write(document["scene"]["name"], proof)
     document = {**document, "proof": None if path is None else str(path)}
@@ -214,10 +217,9 @@ def certify(args: Namespace) -> int:
         output.print_pairs(document["pairs"])
         for pair in document["pairs"]:
             if pair["witness_q"] is not None:
-                where = ", ".join(f"{value:.6g}" for value in pair["witness_q"])
                 collides = pair["outcome"] == Outcome.REFUTED
                 how = fails(pair["a"], pair["b"]) if collides else f"{called(pair['a'], pair['b'])}: {pair['detail']},"
-                print(f"{how} at q = {where}")
+                print(f"{how} at q = {joint_positions(pair['witness_q'], units)}")
         scene = document["scene"]["name"]
         print(f"{scene}: {output.plain(document['outcome'])}, guarantee {document['guarantee']}, {output.seconds(document['seconds'])}")
         if document["region"] is not None:
@@ -328,9 +330,10 @@ def contains(args: Namespace) -> int:
             proofs += [f"map of job {answer['map']}"] * bool(point["map"])
             print(f"inside: {where} in {'; '.join(proofs)}")
         else:
+            beyond = "not in the scene's one region" if answer["regions"] == 1 else f"in none of {answer['regions']} regions"
             mapped = "" if point["map"] is None else ", nor does the map prove it free"
             trouble = ": " + "; ".join(point["trouble"]) if point["trouble"] else ", though floating point finds nothing wrong there"
-            print(f"outside: {where} is in none of {answer['regions']} regions{mapped}{trouble}")
+            print(f"outside: {where} is {beyond}{mapped}{trouble}")
     return OK if inside else NO
 
 

@@ -29,7 +29,7 @@ def cover(args: Namespace) -> int:
 
 
 def _components(sizes: Sequence[int]) -> str:
-    return f"{len(sizes)}, with {', '.join(map(str, sizes))} regions" if sizes else "-"
+    return f"{len(sizes)}, with {', '.join(map(str, sizes))} region{'' if [*sizes] == [1] else 's'}" if sizes else "-"
 
 
 def _print(found: dict[str, Any]) -> None:

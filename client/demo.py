@@ -20,6 +20,7 @@ from typing import Any
 import certifier
 from certifier.errors import CirisError, unreadable
 from certifier.outcome import DEADLINE
+from certifier.words import counted
 from ciris.documents import asked_as
 from ciris.find import api_key, data_dir, running_stack
 from ciris.synchronous.client import Client
@@ -64,7 +65,8 @@ def _demonstrate(url: str) -> tuple[bool, str | None]:
     with Client(url, api_key()) as client:
         scene = client.add_scene(SCENE)
         print(f"ciris is up at {url} (data: {data_dir()})")
-        size = f"{scene['joints']} joints, {scene['geometries']} convex bodies, {scene['pairs']} pairs to separate"
+        bodies = counted(scene["geometries"], "convex body", "convex bodies")
+        size = f"{counted(scene['joints'], 'joint')}, {bodies}, {counted(scene['pairs'], 'pair')} to separate"
         print(f"scene {scene['name']}: {size}", flush=True)
         grown = _grown(client, {"kind": "grow", "scene": asked_as(scene, None), "seed": {"q": seed_of(str(SCENE), None)}})
     path = ProofFile(str(data_dir() / f"{file_name(scene['name'])}.proof")).write(scene["name"], grown.proof)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 
 from certifier.errors import CirisError
+from certifier.words import counted
 from ciris.find import api_key, data_dir, service_url
 from ciris.synchronous.client import Client
 from client.cores import cores
@@ -30,7 +31,7 @@ def examine(url: str | None) -> list[Finding]:
     """Looks at everything, and returns the findings in an order for people."""
     return [
         Finding("python", f"{platform.python_version()} on {platform.platform()}", sys.version_info >= (3, 11)),
-        Finding("machine", f"{cores()} cores, {_memory_gib():.1f} GiB of memory"),
+        Finding("machine", f"{counted(cores(), 'core')}, {_memory_gib():.1f} GiB of memory"),
         *map(_package, PACKAGES),
         _tried("drake solvers", _solvers),
         _tried("exact arithmetic", _flint),

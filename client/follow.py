@@ -11,9 +11,10 @@ from typing import Any
 from certifier.conditions import called
 from certifier.errors import CirisError
 from certifier.outcome import Outcome, Stage
+from certifier.words import counted
 from ciris.documents import Document
 from ciris.synchronous.client import Client
-from client.output import Screen, number, plain, q_volume, seconds, share
+from client.output import Screen, plain, q_volume, seconds, share
 
 _STEPS = {
     "propose": "seeding",
@@ -66,7 +67,7 @@ class Teller:
             self._screen.line(f"iteration {data['index']} ({data['label']}): {result}{self._failure}")
             return
         self._total, self._done, self._failure = data["parts"], 0, ""
-        of = f"{'pieces of work on' if data.get('together') else 'parts of'} {data['pairs']} pairs"
+        of = f"{'pieces of work on' if data.get('together') else 'parts of'} {counted(data['pairs'], 'pair')}"
         self._what = "pairs" if data["parts"] == data["pairs"] else of
         self._screen.status(f"iteration {data['index']} ({data['label']}): {self._total} {self._what}{self._kept}", 0.0)
 
@@ -83,7 +84,7 @@ class Teller:
 
     def _tell_cover(self, data: dict[str, Any]) -> None:
         grows = ", ".join(data["growing"])
-        regions, components = number(data["regions"], "region"), number(len(data["components"]), "component")
+        regions, components = counted(data["regions"], "region"), counted(len(data["components"]), "component")
         state = f"{share(data['coverage'])} covered by {regions} in {components}"
         self._screen.status(f"{state}{f'; growing {grows}' if grows else ''}", data["coverage"]["value"])
         self._kept = state

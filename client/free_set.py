@@ -7,6 +7,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from certifier.names import escaped
+from certifier.words import counted
 from client import output
 from client.files import ProofFile, check_writable, file_name
 from client.verify import in_child
@@ -25,6 +26,7 @@ def write(args: Namespace) -> int:
     if args.json:
         output.print_json({**found, "file": str(written)})
     else:
-        print(escaped(f"{found['name']}: the proof holds, {found['cells']} cells; {found['nodes']} nodes of trees for lookups"))
+        size = f"{counted(found['cells'], 'cell')}; {counted(found['nodes'], 'node')} of trees for lookups"
+        print(escaped(f"{found['name']}: the proof holds, {size}"))
         print(f"free set {written} (read it: ciris.FreeSet.load)")
     return 0

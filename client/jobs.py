@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Sequence
 from typing import Any
 
 from certifier.errors import CirisError
+from certifier.words import counted, unit_names
 from ciris.documents import Document
-from client import output
+from client import output, service
 from client.follow import follow
 from client.inputs import labels
 from client.output import Screen, print_json
-from client.service import connect
 
 OK, NO = 0, 1
 SHORT = 8
@@ -22,7 +23,7 @@ WORST = 5
 
 def job_ls(args: Namespace) -> int:
     wanted = labels(args.label)
-    with connect(args.url) as client:
+    with service.connect(args.url) as client:
         jobs = client.jobs(state=args.state, scene=args.scene, labels=wanted, search=args.search, most=args.most)
         names = {scene["id"]: scene["name"] for scene in client.scenes()}
     if args.json:
@@ -45,28 +46,29 @@ def job_ls(args: Namespace) -> int:
 
 
 def job_show(args: Namespace) -> int:
-    with connect(args.url) as client:
+    with service.connect(args.url) as client:
         job = client.job(args.job)
         regions, obstacles = client.regions(job=job["id"]), client.obstacles(job["id"])
+        units = [*service.units(client.scene(job["scene"])).values()] if obstacles else []
     if args.json:
         print_json({**job, "regions": regions, "obstacles": obstacles})
         return OK
     _print(job)
     for region in regions:
-        print(f"  region {region['id'][:SHORT]}: {output.share(region['share'])} of the proposal, {region['faces']} faces")
+        print(f"  region {region['id'][:SHORT]}: {output.share(region['share'])} of the proposal, {counted(region['faces'], 'face')}")
     for one in obstacles[:WORST]:
-        print(f"  {one['text']}{_at(one['q'])}")
+        print(f"  {one['text']}{_at(one['q'], units)}")
     return OK
 
 
-def _at(q: list[float] | None) -> str:
+def _at(q: list[float] | None, units: Sequence[str]) -> str:
     """Returns the configuration of an obstacle in radians and metres, as other commands take it."""
-    return "" if q is None else f"\n    --q={','.join(f'{x:.6g}' for x in q)}"
+    return "" if q is None else f"\n    in {unit_names(units)}: --q={','.join(f'{x:.6g}' for x in q)}"
 
 
 def job_follow(args: Namespace) -> int:
     """Tells what happens until the job has ended. Its exit status is 0 for a certified one."""
-    with connect(args.url) as client:
+    with service.connect(args.url) as client:
         job = follow(client, args.job, Screen(), args.watch)
     if args.json:
         print_json(job)
@@ -77,7 +79,7 @@ def job_follow(args: Namespace) -> int:
 
 def job_cancel(args: Namespace) -> int:
     """Asks a job to end. Of one that had ended before, it says so."""
-    with connect(args.url) as client:
+    with service.connect(args.url) as client:
         before = client.job(args.job)
         job = client.cancel(before["id"])
     if before["ended"]:
@@ -86,14 +88,14 @@ def job_cancel(args: Namespace) -> int:
 
 
 def job_retry(args: Namespace) -> int:
-    with connect(args.url) as client:
+    with service.connect(args.url) as client:
         job = client.retry(args.job)
     return _say(job, args)
 
 
 def job_webhook(args: Namespace) -> int:
     """Says how telling the receiver goes, and has it called again where the user asks for it."""
-    with connect(args.url) as client:
+    with service.connect(args.url) as client:
         job = client.job(args.job)["id"]
         hook = client.resend_webhook(job) if args.resend else client.webhook(job)
     if args.json:
@@ -109,7 +111,7 @@ def job_webhook(args: Namespace) -> int:
 
 def job_webhooks(args: Namespace) -> int:
     """Lists whom jobs tell that they have ended, and whether that went well."""
-    with connect(args.url) as client:
+    with service.connect(args.url) as client:
         found = client.webhooks(args.state)
     if args.json:
         print_json(found)

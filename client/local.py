@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -122,10 +122,12 @@ def _teller(scene: Scene, screen: Screen, watch: bool) -> Callable[[str, dict[st
 
 def certify(
     scene: str, given: PolytopeFile, asked: Document, screen: Screen, watch: bool, drake: str | None, prove: bool = False
-) -> tuple[dict[str, Any], bytes | None]:
-    """Certifies a polytope in this process, and returns the document of ``ciris certify --json``.
+) -> tuple[dict[str, Any], Sequence[str], bytes | None]:
+    """Certifies a polytope in this process.
 
-    The proof comes with it where that is asked for (``prove``) and the polytope is certified.
+    Returns:
+        the document of ``ciris certify --json``; the units of joint positions, (n,); and the proof, where that is asked for (``prove``) and
+        the polytope is certified.
 
     Args:
         asked: the options of the request, for our certifier.
@@ -161,4 +163,4 @@ def certify(
         for index, result in sorted(verdict.results.items())
     ]
     document = verdicts.document(loaded.name, loaded.hash, verdict.outcome, verdict.guarantee, verdict.seconds, pairs)
-    return document, None if verdict.region is None else verdict.region.proof
+    return document, loaded.units, None if verdict.region is None else verdict.region.proof

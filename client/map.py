@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from argparse import Namespace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from certifier.options import read
 from certifier.proof.map import MapProof
 from certifier.seeding.limits import check_limits
 from certifier.verify.file import read_file
+from certifier.words import counted, joint_positions
 from ciris.documents import Document
 from ciris.synchronous.client import Client
 from client import output, service
@@ -40,19 +42,19 @@ def grow(args: Namespace) -> int:
     """
     asked = request(args, MAP)
     check_writable(args.out)
-    document = (_here if args.local else _by_service)(args, asked)
+    document, units = (_here if args.local else _by_service)(args, asked)
     if args.json:
         print_json(document)
     else:
-        _print(document)
+        _print(document, units)
     if document["ended"] == "interrupted":
         return INTERRUPTED
     first = [one["state"] == "proved" for one in document["at"]] + [share == 1 for share in document["paths"]]
     return OK if document["outcome"] == "certified" and all(first) else NO
 
 
-def _here(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
-    """Grows a map in this process and children of it, and returns what to tell of it."""
+def _here(args: Namespace, asked: dict[str, Any]) -> tuple[dict[str, Any], Sequence[str]]:
+    """Grows a map in this process and children of it, and returns what to tell of it, with the units of joint positions, (n,)."""
     refuse_of_service(args)
     screen = Screen()
     scene = load(args.scene)
@@ -83,7 +85,7 @@ def _here(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
     screen.clear()
     path = ProofFile(args.out).write(scene.name, found.proof.to_bytes())
     share, error = found.coverage
-    return {
+    document = {
         "scene": {"name": scene.name, "hash": scene.hash},
         "outcome": "certified" if share >= options.coverage else "inconclusive",
         "coverage": {"value": share, "stderr": error},
@@ -96,15 +98,16 @@ def _here(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
         "paths": _shares(found.proof, paths) if paths else [],
         "proof": str(path),
     }
+    return document, scene.units
 
 
-def _by_service(args: Namespace, asked: dict[str, Any]) -> dict[str, Any]:
-    """Has the service grow a map, and returns what to tell of it."""
+def _by_service(args: Namespace, asked: dict[str, Any]) -> tuple[dict[str, Any], Sequence[str]]:
+    """Does as :func:`_here` by the service."""
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)
         former = {} if args.former is None else {"former": args.former}
         job = service.run(client, {"kind": "map", "scene": scene["asked"], **asked, **former}, Screen())
-        return _written(client, job["id"], scene, args.out)
+        return _written(client, job["id"], scene, args.out), [*service.units(scene).values()]
 
 
 def of_job(args: Namespace) -> int:
@@ -117,13 +120,14 @@ def of_job(args: Namespace) -> int:
         check_writable(path)
     with service.connect(args.url) as client:
         job = client.job(args.job)
-        document = _written(client, job["id"], client.scene(job["scene"]), args.out)
+        scene = client.scene(job["scene"])
+        document = _written(client, job["id"], scene, args.out)
         if args.free_set is not None:
             Path(args.free_set).write_bytes(client.free_set(job["id"]))
     if args.json:
         print_json(document)
     else:
-        _print(document)
+        _print(document, [*service.units(scene).values()])
     return OK if document["proof"] is not None else NO
 
 
@@ -149,16 +153,17 @@ def _written(client: Client, job: str, scene: Document, out: str | None) -> dict
     }
 
 
-def _print(document: dict[str, Any]) -> None:
+def _print(document: dict[str, Any], units: Sequence[str]) -> None:
     coverage, proof = document["coverage"], document["proof"]
     said = "nothing proved" if coverage is None else _said(coverage["value"], coverage["stderr"], document["cells"])
     print(f"{document['scene']['name']}: {said}, {output.seconds(document['seconds'])}")
     for one in document["at"]:
-        print(f"q = {', '.join(f'{value:.6g}' for value in one['q'])}: {output.plain(one['state'])}")
+        print(f"q = {joint_positions(one['q'], units)}: {output.plain(one['state'])}")
     for i, share in enumerate(document["paths"]):
         print(f"path[{i}]: {output.percent(share)} of it proved")
     if document["given_up"]:
-        print(f"{document['given_up']} pieces of work were given up: the verifier refused what they found")
+        pieces = counted(document["given_up"], "piece")
+        print(f"{pieces} of work {'was' if document['given_up'] == 1 else 'were'} given up: the verifier refused what was found")
     if document.get("former"):
         print(f"begun with the map of job {document['former'][:8]} (anew: --former none)")
     if document["ended"] in ENDS:
@@ -201,12 +206,14 @@ def _wanted(scene: Scene, given: Given, field: str) -> list[float]:
     """
     q = positions_of(scene, given, field)
     if len(q) != scene.n:
-        raise RegionError("seed_wrong_length", f"it has {len(q)} numbers for {scene.n} joints", field=field, hint=scene.in_order)
+        raise RegionError(
+            "seed_wrong_length", f"it has {counted(len(q), 'number')} for {counted(scene.n, 'joint')}", field=field, hint=scene.in_order
+        )
     check_limits(scene, q, field)
     return q
 
 
 def _said(share: float, error: float, cells: int) -> str:
     if error == NO_SAMPLE:
-        return f"no configuration was found that is free of collision, {cells} cells"
-    return f"{100 * share:.1f} % of the free configurations proved (standard error {100 * error:.1f} %), {cells} cells"
+        return f"no configuration was found that is free of collision, {counted(cells, 'cell')}"
+    return f"{100 * share:.1f} % of the free configurations proved (standard error {100 * error:.1f} %), {counted(cells, 'cell')}"

@@ -5,12 +5,14 @@ from __future__ import annotations
 import base64
 import math
 from argparse import Namespace
+from collections.abc import Sequence
 from typing import Any
 
 from certifier.conditions import condition_named
 from certifier.errors import CirisError
 from certifier.motion.padding import padding_of
 from certifier.verify.decimals import at_least_mm, rounded_down
+from certifier.words import counted, joint_positions
 from ciris.documents import Document
 from ciris.synchronous.client import Client
 from client import output, service
@@ -39,7 +41,7 @@ def certify_path(args: Namespace) -> int:
         check_writable(args.out)
         kept = ProofFile(args.out)
     try:
-        document, proof = (_here if args.local else _by_service)(args, path)
+        document, units, proof = (_here if args.local else _by_service)(args, path)
     except CirisError as error:
         error.field = named(error.field, args)
         raise
@@ -48,12 +50,12 @@ def certify_path(args: Namespace) -> int:
     if args.json:
         print_json(document)
     else:
-        _print(document)
+        _print(document, units)
     return OK if document["outcome"] == "certified" else NO
 
 
-def _here(args: Namespace, path: GivenPath) -> tuple[dict[str, Any], bytes | None]:
-    """Returns the document of the verdict of this process, and the proof where there is one."""
+def _here(args: Namespace, path: GivenPath) -> tuple[dict[str, Any], Sequence[str], bytes | None]:
+    """Returns the document of the verdict of this process, the units of joint positions, (n,), and the proof where there is one."""
     from client.local import load, positions_of
 
     scene = load(args.scene)
@@ -66,23 +68,26 @@ def _here(args: Namespace, path: GivenPath) -> tuple[dict[str, Any], bytes | Non
 
     motion = motion_of(scene, given, Space(args.space) if args.space else None)
     verdict = certify(scene, motion, args.tube, padding_of(args.padding), args.clearance)
-    return verdict.document(), verdict.proof
+    return verdict.document(), scene.units, verdict.proof
 
 
-def _by_service(args: Namespace, path: GivenPath) -> tuple[dict[str, Any], bytes | None]:
-    """Returns the document of the service's verdict, and the proof where it was asked for and there is one."""
+def _by_service(args: Namespace, path: GivenPath) -> tuple[dict[str, Any], Sequence[str], bytes | None]:
+    """Does as :func:`_here` by the service. The proof comes only where it was asked for."""
     padding_of(args.padding)
     with service.connect(args.url) as client:
         scene = service.scene_name(client, args.scene)
         asked = {"scene": scene, **path.motion, **{name: getattr(args, name) for name in ("space", "tube", "padding", "clearance")}}
         if args.job:
-            return _by_job(client, {**asked, "kind": "certify-path", **request(args, JOB)}, args.out is not None)
-        document = client.certify_path({**asked, "prove": args.out is not None})
-    return document, None if document["proof"] is None else base64.b64decode(document["proof"])
+            document, proof = _by_job(client, {**asked, "kind": "certify-path", **request(args, JOB)}, args.out is not None)
+        else:
+            document = client.certify_path({**asked, "prove": args.out is not None})
+            proof = None if document["proof"] is None else base64.b64decode(document["proof"])
+        units = [] if args.json else [*service.units(client.scene(scene)).values()]
+    return document, units, proof
 
 
 def _by_job(client: Client, request: Document, prove: bool) -> tuple[dict[str, Any], bytes | None]:
-    """Does as :func:`_by_service` by a job, which may take as long as it needs."""
+    """Returns the document of the verdict of a job, which may take as long as it needs, and the proof where it was asked for."""
     job = service.run(client, request, Screen())["id"]
     document = client.motion(job)
     return document, client.motion_proof(job) if prove and document["proof"] else None
@@ -97,17 +102,17 @@ def _timed(document: dict[str, Any], path: GivenPath) -> dict[str, Any]:
     return {**document, **places}
 
 
-def _print(document: dict[str, Any]) -> None:
+def _print(document: dict[str, Any], units: Sequence[str]) -> None:
     stop, certified, tube, degree = (document[name] for name in ("stop", "certified_to", "tube", "degree"))
     if stop:
         broken = condition_named(stop["a"], stop["b"])
         fails = "is not kept" if document["outcome"] == "refuted" else "could not be decided"
         what = f"the condition '{broken}' {fails}" if broken else f"{stop['a']} and {stop['b']} {_how(document)}"
         print(f"{what} {_place(stop, degree)}")
-        print(f"q = {_joints(stop)}")
+        print(f"q = {joint_positions(stop['q'], units)}")
         print(f"all pairs are certified up to {_place(certified, degree)}" if certified else "nothing is certified before that")
     pieces = document["waypoints"] - 1
-    what = f"{pieces + 1} waypoints, straight" if degree == 1 else f"{pieces} piece{'s' * (pieces > 1)} of degree {degree}"
+    what = f"{pieces + 1} waypoints, straight" if degree == 1 else f"{counted(pieces, 'piece')} of degree {degree}"
     facts = [
         ("motion", f"{document['scene']['name']}, {what} in {document['space']}"),
         ("outcome", f"{output.plain(document['outcome'])}, guarantee {document['guarantee']}"),
@@ -115,11 +120,11 @@ def _print(document: dict[str, Any]) -> None:
     if document["padding"]:
         facts.append(("padding", f"{document['padding']:.9g} m around every body, beyond the scene's"))
     if not stop:
-        facts += _distances(document)
+        facts += _distances(document, units)
     facts.append(("", document["not_covered_summary"]))
     if tube:
         facts.append(("tube", f"every joint up to {rounded_down(tube)} rad ({rounded_down(math.degrees(tube))} deg) or m off the motion"))
-    facts.append(("time", f"{output.seconds(document['seconds'])}, {document['intervals']} intervals"))
+    facts.append(("time", f"{output.seconds(document['seconds'])}, {counted(document['intervals'], 'interval')}"))
     if document["proof"]:
         facts.append(("proof", f"{document['proof']} (check it: ciris verify {document['proof']})"))
     elif certified:
@@ -135,7 +140,7 @@ def _how(document: dict[str, Any]) -> str:
     return f"{apart}, too close to tell," if document["outcome"] == "too_close" else f"{apart} where the search ended,"
 
 
-def _distances(document: dict[str, Any]) -> list[tuple[str, str]]:
+def _distances(document: dict[str, Any], units: Sequence[str]) -> list[tuple[str, str]]:
     """Returns how far apart the bodies of a motion that is certified are."""
     nearest, where = document["nearest"], " in the tube" if document["tube"] else ""
     if nearest is None:
@@ -145,13 +150,8 @@ def _distances(document: dict[str, Any]) -> list[tuple[str, str]]:
     return [
         ("clearance", f"at least {at_least_mm(document['clearance'])}, padded, proved{where}"),
         ("closest", closest),
-        ("", f"q = {_joints(nearest)}"),
+        ("", f"q = {joint_positions(nearest['q'], units)}"),
     ]
-
-
-def _joints(place: dict[str, Any]) -> str:
-    """Returns the joint positions of a place for people."""
-    return ", ".join(f"{value:.6g}" for value in place["q"])
 
 
 def _place(place: dict[str, Any], degree: int) -> str:

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from certifier.verify.decimals import at_least_mm
+from certifier.words import counted
 
 Row = Sequence[str]
 
@@ -85,10 +86,19 @@ def print_table(header: Row, rows: Iterable[Row], right: str = "") -> None:
         print("  ".join(cells).rstrip())
 
 
-def print_configurations(configurations: Mapping[str, Mapping[str, float]]) -> None:
-    """Prints a line for each named configuration, if there are any."""
+def print_configurations(configurations: Mapping[str, Mapping[str, float]], units: Mapping[str, str]) -> None:
+    """Prints a line for each named configuration, if there are any.
+
+    Args:
+        units: of the joints' positions, by their names.
+    """
     for name, positions in configurations.items():
-        print(f"configuration {name}: {', '.join(f'{joint} {value:.6g}' for joint, value in positions.items())}")
+        print(f"configuration {name}: {', '.join(f'{joint} {value:.6g} {units[joint]}' for joint, value in positions.items())}")
+
+
+def scene_size(joints: int, geometries: int, pairs: int) -> str:
+    """Returns how large a scene is, for people."""
+    return ", ".join((counted(joints, "joint"), counted(geometries, "geometry", "geometries"), counted(pairs, "pair")))
 
 
 def print_facts(facts: Iterable[tuple[str, str]]) -> None:
@@ -102,11 +112,6 @@ def print_facts(facts: Iterable[tuple[str, str]]) -> None:
 def plain(outcome: str | None) -> str:
     """Returns an outcome for people: ``not_certifiable`` -> ``not certifiable``."""
     return "-" if outcome is None else outcome.replace("_", " ")
-
-
-def number(count: int, of: str) -> str:
-    """Returns ``1 region``, ``2 regions`` and so on."""
-    return f"{count} {of}{'' if count == 1 else 's'}"
 
 
 def seconds(value: float | None, whole: bool = False) -> str:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import base64
 import re
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from certifier.errors import CirisError
 from certifier.verify.decimals import at_least_mm
+from certifier.words import counted, joint_positions, unit_names
 from ciris.documents import Document
 from ciris.synchronous.client import Client
 from client import output, service
@@ -40,14 +41,15 @@ FIELDS = {
 def nearest(args: Namespace) -> int:
     points = [configuration(text) for text in args.q]
     with service.connect(args.url) as client:
-        answer = client.nearest(service.scene_name(client, args.scene), points)
+        scene = service.scene_name(client, args.scene)
+        answer, units = client.nearest(scene, points), _units(client, scene, args)
     if args.json:
         print_json(answer)
     else:
         for q, point in zip(points, answer["points"], strict=True):
             near = point["nearest"]
             early = "" if point["complete"] else "; the search in the map ended early: a nearer point may be proved"
-            print(f"{shown(q)}: {_near(near) if near else _nothing_near(answer)}{early}")
+            print(f"{shown(q)}: {_near(near, units) if near else _nothing_near(answer)}{early}")
     return NO if any(point["nearest"] is None for point in answer["points"]) else OK
 
 
@@ -84,6 +86,7 @@ def plan(args: Namespace) -> int:
         except CirisError as error:
             error.field = error.field and _argument(error.field)
             raise
+        units = _units(client, scene, args)
     written = None
     if proof is not None and answer["proof"] is not None:
         written = str(proof.write(answer["scene"], base64.b64decode(answer["proof"])))
@@ -91,7 +94,8 @@ def plan(args: Namespace) -> int:
         print_json({**answer, "proof": written})
     elif answer["found"]:
         _print_pieces(answer["pieces"])
-        print(f"{len(answer['q'])} configurations, {answer['length']:.4g} long in q, {answer['duration']:.4g} s; --json prints them")
+        length = f"{answer['length']:.4g} long in q ({unit_names(units.values())})"
+        print(f"{counted(len(answer['q']), 'configuration')}, {length}, {answer['duration']:.4g} s; --json prints them")
         by = "lies in certified regions" if answer["motion"] is None else "is proved to be free of collision"
         print(f"all of the motion {by}, guarantee {answer['guarantee']}")
         if proof is not None and written is None:
@@ -99,7 +103,7 @@ def plan(args: Namespace) -> int:
         if written:
             print(f"proof: {written} (check it: ciris verify {written})")
     else:
-        print(_why_not(answer))
+        print(_why_not(answer, units))
     return OK if answer["found"] else NO
 
 
@@ -141,6 +145,7 @@ def path(args: Namespace) -> int:
         except CirisError as error:
             error.field = named(error.field, args)
             raise
+        units = _units(client, scene, args)
     stop = answer["uncovered"]
     if args.json:
         print_json(answer)
@@ -149,25 +154,26 @@ def path(args: Namespace) -> int:
     if stop is None:
         print("covered: every point of the path is proved to be free of collision")
     else:
-        print(f"not covered from {stop['time']:.6g} on, at q = {_place(stop['q'])}")
-        print(f"next: {_near(stop['next']) if stop['next'] else _no_region(answer)}")
+        print(f"not covered from {stop['time']:.6g} on, at q = {_place(stop['q'], units)}")
+        print(f"next: {_near(stop['next'], units) if stop['next'] else _no_region(answer)}")
     return OK if answer["covered"] else NO
 
 
 def graph(args: Namespace) -> int:
     screen = Screen()
     with service.connect(args.url) as client:
-        answer = service.graph(client, service.scene_name(client, args.scene), screen)
+        scene = service.scene_name(client, args.scene)
+        answer, units = service.graph(client, scene, screen), _units(client, scene, args)
     screen.clear()
     if args.json:
         print_json(answer)
         return OK
     print(f"regions: {answer['regions']}, overlaps: {len(answer['edges'])}, components: {answer['components']}")
     if answer["edges"]:
-        rows = [(edge["a"], edge["b"], f"{edge['depth']:.3g}", _place(edge["q"])) for edge in answer["edges"]]
+        rows = [(edge["a"], edge["b"], f"{edge['depth']:.3g}", _place(edge["q"], units)) for edge in answer["edges"]]
         output.print_table(("region", "overlaps", "depth", "witness q"), rows, right="depth")
     for gap in answer["gaps"]:
-        said = "the map proves the straight motion across it" if gap["map"] else _advice(gap)
+        said = "the map proves the straight motion across it" if gap["map"] else _advice(gap, units)
         print(f"gap of {gap['distance']:.3g} in s between {gap['a']} and {gap['b']}; {said}")
     return OK
 
@@ -204,20 +210,21 @@ def _limit(text: str | None, field: str) -> float | list[float] | None:
     return values[0] if len(values) == 1 else values
 
 
-def _why_not(answer: dict[str, Any]) -> str:
+def _why_not(answer: dict[str, Any], units: Mapping[str, str]) -> str:
     """Returns in words why there is no motion."""
     gap, stop, reason = answer["gap"], answer["uncovered"], answer["reason"]
     if limit := answer["limit"]:
+        unit = units[limit["joint"]]
         bounds = " ".join(f"{word} {limit[side]:.10g}" for word, side in (("from", "lower"), ("to", "upper")) if limit[side] is not None)
-        return f"{_field(limit['where'])}: joint {limit['joint']} is at {limit['value']:.10g}, and its limits are {bounds}"
+        return f"{_field(limit['where'])}: joint {limit['joint']} is at {limit['value']:.10g} {unit}, and its limits are {bounds} {unit}"
     if touching := answer["collision"]:
         how = "overlap" if touching["depth"] is None else f"overlap by {at_least_mm(touching['depth'])}"
-        free = f"; free near by: {_place(touching['free'])}" if touching["free"] else ""
+        free = f"; free near by: {_place(touching['free'], units)}" if touching["free"] else ""
         what = touching["condition"] or f"{touching['a']} and {touching['b']} {how}"
         return f"{_field(touching['where'])}: {what}{free}"
     if reached := answer["reached"]:
         nearest = f"the nearest that was found is off by {1000 * reached['metres']:.3g} mm and {reached['radians']:.3g} rad"
-        return f"--to-pose: no configuration reaches it; {nearest}, at q = {_place(reached['q'])}"
+        return f"--to-pose: no configuration reaches it; {nearest}, at q = {_place(reached['q'], units)}"
     if stop_at := answer["line"]:
         why = {
             "line_limit": f"joint {stop_at['joint']} is at its limit",
@@ -233,13 +240,15 @@ def _why_not(answer: dict[str, Any]) -> str:
             return "a motion was found, but none that could be certified: it passes by something too closely"
         case "start_uncovered" | "goal_uncovered":
             end = "--from" if reason == "start_uncovered" else "--to"
-            return f"{end} is in no certified region; nearest: {_near(answer['nearest']) if answer['nearest'] else _no_region(answer)}"
+            return (
+                f"{end} is in no certified region; nearest: {_near(answer['nearest'], units) if answer['nearest'] else _no_region(answer)}"
+            )
         case "disconnected":
             sides = f"{gap['start_regions']} of {answer['regions']} regions are connected with --from, {gap['goal_regions']} with --to"
             between = f"between {gap['start']} and {gap['goal']}"
-            return f"{sides}\ngap of {gap['distance']:.3g} in s {between}; {_advice(gap)}"
+            return f"{sides}\ngap of {gap['distance']:.3g} in s {between}; {_advice(gap, units)}"
         case _:
-            where = f", the last one not at {stop['time']:.6g} s, q = {_place(stop['q'])}" if stop else ""
+            where = f", the last one not at {stop['time']:.6g} s, q = {_place(stop['q'], units)}" if stop else ""
             return f"regions lead from --from to --to, but no trajectory was proved to be in them{where}"
 
 
@@ -267,11 +276,11 @@ def _proof_of(piece: dict[str, Any]) -> str:
     return f"motion {piece['motion']}" if piece["motion"] else f"region {piece['region']}"
 
 
-def _near(near: dict[str, Any]) -> str:
+def _near(near: dict[str, Any], units: Mapping[str, str]) -> str:
     what = f"the map of job {near['map']}" if near["map"] else near["region"]
     if near["distance"] == 0:
         return f"inside {what} ({near['guarantee']})"
-    return f"{near['distance']:.3g} in s from {what} ({near['guarantee']}), whose nearest point is {_place(near['q'])}"
+    return f"{near['distance']:.3g} in s from {what} ({near['guarantee']}), whose nearest point is {_place(near['q'], units)}"
 
 
 def _nothing_near(answer: dict[str, Any]) -> str:
@@ -280,14 +289,19 @@ def _nothing_near(answer: dict[str, Any]) -> str:
     return "nothing was found, or a joint is outside its limits"
 
 
-def _advice(gap: dict[str, Any]) -> str:
+def _advice(gap: dict[str, Any], units: Mapping[str, str]) -> str:
     """Returns what to do about a gap between regions."""
-    return "no free configuration was found near its middle" if gap["q"] is None else f"try the seed {_place(gap['q'])}"
+    return "no free configuration was found near its middle" if gap["q"] is None else f"try the seed {_place(gap['q'], units)}"
 
 
 def _no_region(answer: dict[str, Any]) -> str:
     return "the scene has no regions" if answer["regions"] == 0 else "no region to compare with, or a joint is outside its limits"
 
 
-def _place(q: Sequence[float]) -> str:
-    return ", ".join(f"{value:g}" for value in q)
+def _place(q: Sequence[float], units: Mapping[str, str]) -> str:
+    return joint_positions(q, units.values())
+
+
+def _units(client: Client, scene: str, args: Namespace) -> dict[str, str]:
+    """Returns the units of joint positions by the joints' names, in position order, for what people read."""
+    return {} if args.json else service.units(client.scene(scene))

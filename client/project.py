@@ -57,7 +57,7 @@ def show(args: Namespace) -> int:
         [
             *([("your scope", project["scope"])] if "scope" in project else []),
             ("stored", f"{project['bytes'] / 1e6:.1f} MB" + ("" if most is None else f" of {most / 1e6:.1f} MB")),
-            ("kept", "for ever" if days is None else f"jobs for {days:g} days after their end, regions and scenes for ever"),
+            ("kept", "for ever" if days is None else f"jobs for {_days(days)} after their end, regions and scenes for ever"),
             ("solvers", _solvers(project)),
         ]
     )
@@ -70,6 +70,10 @@ def _solvers(project: Document) -> str:
     if most is None:
         return f"{used:.0f} s this month"
     return f"{used:.0f} of {most:.0f} s this month; {max(most - used, 0.0):.0f} s left until {project['month_ends_at'][:10]}"
+
+
+def _days(number: float) -> str:
+    return f"{number:g} {'day' if number == 1 else 'days'}"
 
 
 def _number(value: float | None) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 
 from certifier.conditions import called
 from certifier.errors import CirisError, unreadable
+from certifier.words import counted
 from ciris.documents import Document
 from ciris.synchronous.client import Client
 from client import output, service
@@ -102,6 +103,6 @@ def _facts(said: dict[str, Any]) -> list[tuple[str, str]]:
     cut = [called(pair["a"], pair["b"]) for pair in said["cut"]]
     return [
         ("kept", f"{output.share(said['kept'])} of the region before"),
-        ("proofs", f"{len(said['carried'])} pairs carried over, {len(said['proved'])} proved again"),
+        ("proofs", f"{counted(len(said['carried']), 'pair')} carried over, {len(said['proved'])} proved again"),
         *(("cut" if not i else "", f"something was cut off for {pair}") for i, pair in enumerate(cut)),
     ]

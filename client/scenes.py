@@ -26,6 +26,7 @@ from certifier.verify.conditions import conditions
 from certifier.verify.decimals import at_most_mm
 from certifier.verify.paddings import paddings
 from certifier.verify.uncovered import unlisted
+from certifier.words import counted
 from client import output
 from client.inputs import numbers
 from client.local import positions_of
@@ -57,10 +58,10 @@ def scene_init(args: Namespace) -> int:
         raise
     out.write_text(drafted.text, encoding="utf-8")
     scene = drafted.scene
-    print(f"{out}: {scene.n} joints, {len(scene.geometries)} geometries, {len(scene.pairs)} pairs; {len(scene.ignored)} ignored")
+    print(f"{out}: {output.scene_size(scene.n, len(scene.geometries), len(scene.pairs))}; {len(scene.ignored)} ignored")
     for note in drafted.notes:
         print(note)
-    output.print_configurations(scene.configurations)
+    output.print_configurations(scene.configurations, _units(scene))
     for warning in scene.warnings:
         print("warning:", warning, file=sys.stderr)
     for warning in _overlaps(drafted):
@@ -77,11 +78,20 @@ def scene_init(args: Namespace) -> int:
     return 0
 
 
+def _units(scene: Scene) -> dict[str, str]:
+    """Returns the units of joint positions by the names of the joints."""
+    return {joint.name: joint.unit for joint in scene.moving}
+
+
 def _overlaps(drafted: Draft) -> list[str]:
     """Returns what there is to say about pairs that overlap at every configuration that was tried."""
     doubtful = [pair for pair in drafted.ignored if pair in drafted.doubtful]
     said = [f"{pair.a} and {pair.b} are ignored, but {drafted.doubtful[pair]}" for pair in doubtful[:1]]
-    said += [f"so are {len(doubtful) - 1} more pairs: the comments at ignore name them"] if len(doubtful) > 1 else []
+    said += (
+        [f"{'so is 1 more pair' if len(doubtful) == 2 else f'so are {len(doubtful) - 1} more pairs'}: the comments at ignore say which"]
+        if len(doubtful) > 1
+        else []
+    )
     for pair in drafted.overlapping:
         always = f"{pair.a} and {pair.b} overlap at every configuration that was tried"
         doubt = drafted.doubtful.get(pair)
@@ -136,12 +146,12 @@ def scene_check(args: Namespace) -> int:
         output.print_json(_document(scene, q, bad, unkept, costs))
         return 1 if broken else 0
     geometries = sum(not of_condition(geometry.name) for geometry in scene.geometries)
-    print(f"{scene.name}: {scene.n} joints, {geometries} geometries, {len(scene.body_pairs)} pairs, {len(scene.ignored)} ignored")
+    print(f"{scene.name}: {output.scene_size(scene.n, geometries, len(scene.body_pairs))}, {len(scene.ignored)} ignored")
     for line in conditions(scene):
         print(line)
     print()
     output.print_table(("joint", "kind", "lower", "upper", "q*", "q", ""), _joints(scene, q), right="lower upper q* q")
-    output.print_configurations(scene.configurations)
+    output.print_configurations(scene.configurations, _units(scene))
     print()
     if replaced := _replaced(scene):
         output.print_table(("geometry", "what stands for it", "outside of it", "beyond the mesh"), replaced)
@@ -165,7 +175,7 @@ def scene_check(args: Namespace) -> int:
     kinematics = Kinematics.of(scene)
     for cost in costs[:COSTLIEST]:
         joints = len(kinematics.chain(*(scene.geometry(name).body for name in (cost.a, cost.b))))
-        print(f"  {called(cost.a, cost.b)}: {joints} joints between them, {output.seconds(cost.seconds)}")
+        print(f"  {called(cost.a, cost.b)}: {counted(joints, 'joint')} between them, {output.seconds(cost.seconds)}")
     return 1 if broken else 0
 
 
@@ -177,7 +187,9 @@ def _configuration(scene: Scene, args: Namespace) -> tuple[np.ndarray, str]:
     q = positions_of(scene, seed_of(args.path, args.q), "--q" if args.q is not None else seed.name)
     if len(q) != scene.n:
         field = seed.name if args.q is None else "--q"
-        raise CirisError("seed_wrong_length", f"{len(q)} numbers for {scene.n} joints", field=field, hint=scene.in_order)
+        raise CirisError(
+            "seed_wrong_length", f"{counted(len(q), 'number')} for {counted(scene.n, 'joint')}", field=field, hint=scene.in_order
+        )
     return np.array(q), "--q" if args.q is not None else seed.name
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from certifier.errors import CirisError
 from certifier.outcome import Guarantee, Outcome
+from certifier.words import counted
 from ciris.documents import Document, asked_as
 from ciris.find import api_key, service_url
 from ciris.job import why_no_region
@@ -67,6 +68,11 @@ def scene_name(client: Client, scene: str) -> str:
     """
     asked: str = known_scene(client, scene)["asked"] if is_scene_file(scene) else scene
     return asked
+
+
+def units(scene: Document) -> dict[str, str]:
+    """Returns the units of joint positions by the names of the joints, in position order."""
+    return {joint["name"]: "rad" if joint["kind"] == "revolute" else "m" for joint in scene["positions"]}
 
 
 def warn(client: Client, scene_id: str) -> None:
@@ -129,7 +135,7 @@ def graph(client: Client, scene: str, screen: Screen) -> Document:
     """Returns which regions of a scene overlap, once the service has compared them all."""
     answer = client.graph(scene)
     while not answer["complete"]:
-        screen.status(f"comparing regions: {len(answer['edges'])} overlaps so far")
+        screen.status(f"comparing regions: {counted(len(answer['edges']), 'overlap')} so far")
         answer = client.graph(scene)
     return answer
 

@@ -6,7 +6,7 @@ from argparse import Namespace
 from shlex import quote
 
 from client import service
-from client.output import Screen, print_json
+from client.output import Screen, print_json, scene_size
 
 OK = 0
 
@@ -19,7 +19,8 @@ def scene_stage(args: Namespace) -> int:
         print_json(scene)
         return OK
     name, staged = quote(args.name), quote(_staged(args.name))
-    print(f"{scene['id']}  {_staged(args.name)}: {scene['joints']} joints, {scene['geometries']} geometries, {scene['pairs']} pairs")
+    size = scene_size(scene["joints"], scene["geometries"], scene["pairs"])
+    print(f"{scene['id']}  {_staged(args.name)}: {size}")
     print(f"next: ciris recertify --from {name} --scene {staged}")
     print(f"then: ciris scene promote {name}")
     return OK

@@ -12,6 +12,7 @@ from certifier.growth.options import CertifyOptions
 from certifier.model import Polytope, Scene
 from certifier.outcome import Outcome
 from certifier.positions import check_magnitude
+from certifier.words import counted
 from db.session import Database
 from jobs.checks import check_length
 from jobs.fields import Offsets, Request, Rows, Vector, model_of
@@ -50,7 +51,7 @@ class Certify(Growing):
         for i, row in enumerate(given.C):
             check_length(scene, row, f"polytope.C[{i}]", "polytope_shape")
         if len(given.C) != len(given.d):
-            problem = f"C has {len(given.C)} rows and d has {len(given.d)} numbers"
+            problem = f"C has {counted(len(given.C), 'row')} and d has {counted(len(given.d), 'number')}"
             raise RegionError("polytope_shape", problem, field="polytope.d", hint="give one number a row")
         Polytope.given(given.C, given.d, scene.n)
         if given.center is not None:

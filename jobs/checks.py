@@ -13,6 +13,7 @@ from certifier.errors import RegionError
 from certifier.model import Scene
 from certifier.pair.collisions import contacts
 from certifier.seeding.limits import check_limits
+from certifier.words import counted, joint_positions
 
 SAMPLES, LOOKED_AT = 100, 10_000
 """Lines are looked at in at most SAMPLES configurations altogether, and at most LOOKED_AT pairs in all of these together."""
@@ -25,7 +26,8 @@ def check_length(scene: Scene, values: Sequence[float], field: str, code: str) -
         RegionError: ``code``, at ``field``.
     """
     if len(values) != scene.n:
-        message = f"{len(values)} numbers were given; the scene has {scene.n} joints"
+        given = f"{counted(len(values), 'number')} {'was' if len(values) == 1 else 'were'}"
+        message = f"{given} given; the scene has {counted(scene.n, 'joint')}"
         raise RegionError(code, message, field=field, hint=scene.in_order)
 
 
@@ -59,6 +61,6 @@ def blocked(scene: Scene, points: dict[str, Sequence[float]]) -> list[str]:
     for (at, where), found in zip(samples, contacts(scene, np.array([at for at, _ in samples])), strict=True):
         if pair := next((scene.pairs[i] for i in found if contact_refutes(scene, scene.pairs[i])), None):
             q = scene.to_q(at)
-            here = f"at q = {', '.join(f'{x:.6g}' for x in q)}"
+            here = f"at q = {joint_positions(q, scene.units)}"
             return [f"a region cannot hold {where}: {trouble(scene, pair, q)} {here}, as computed; the job will probably end at once"]
     return []

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from certifier.errors import SceneError
 from certifier.model import WORLD, Joint, Scene
+from certifier.words import counted
 
 _Way = tuple[object, ...]
 """The numbers of the joints from the world to a body."""
@@ -29,7 +30,12 @@ def same_bodies(old: Scene, new: Scene) -> dict[str, str]:
 def _check_joints(old: Scene, new: Scene, before: dict[str, _Way], after: dict[str, _Way]) -> None:
     hint = "grow a region of the new scene: its joints, their limits and q* must be those of the old one"
     if old.n != new.n:
-        raise SceneError("other_robot", f"the old scene has {old.n} joints that move and the new one has {new.n}", field="scene", hint=hint)
+        raise SceneError(
+            "other_robot",
+            f"the old scene has {counted(old.n, 'joint')} that can move, and the new one has {new.n}",
+            field="scene",
+            hint=hint,
+        )
     for first, second, *q_star in zip(old.moving, new.moving, old.q_star.tolist(), new.q_star.tolist(), strict=True):
         what = next(_differences(first, second, before, after, q_star), None)
         if what is not None:

@@ -23,6 +23,7 @@ from certifier.pair.collisions import touching
 from certifier.polytopes.closest import closest
 from certifier.proof.negative import WitnessProof
 from certifier.verify.witness import check_witness
+from certifier.words import counted
 
 
 def begin_again(scene: Scene, state: GrowthState) -> Transition:
@@ -37,7 +38,7 @@ def begin_again(scene: Scene, state: GrowthState) -> Transition:
     given = Polytope.given(asked["C"], asked["d"], scene.n)
     if any(len(q) != scene.n for q in asked["q"]):
         raise RegionError(
-            "seed_wrong_length", f"a configuration to keep has not {scene.n} numbers", field="seed.q", hint="one for each joint"
+            "seed_wrong_length", f"a configuration to keep has not {counted(scene.n, 'number')}", field="seed.q", hint="one for each joint"
         )
     keep = scene.to_s(scene.in_windows(np.array(asked["q"], dtype=float).reshape(-1, scene.n), "seed.q"))
     limits = scene.polytope([], [])

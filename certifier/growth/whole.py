@@ -27,6 +27,7 @@ from certifier.partition.together import LOST, THIN, Together, divided, together
 from certifier.polytopes.cutting import BARELY, Cut, cut, lost_together, samples_of
 from certifier.polytopes.proved import ProvedBox
 from certifier.polytopes.pushed import pushed
+from certifier.words import with_units
 
 FAR = 1.2
 """In every further stage, the faces of the region move out to this many times their distance from the seed."""
@@ -98,16 +99,13 @@ def begin_stage(scene: Scene, state: GrowthState, polytope: Polytope, kept: floa
 
 def in_words(scene: Scene, q: Sequence[float] | Array) -> str:
     """Returns a configuration, (n,), as people read it, in degrees and metres: ``q = (23.5, -11.5) deg``."""
-    units = [joint.shown for joint in scene.moving]
+    shown = [joint.shown for joint in scene.moving]
     texts = [
         f"{round(scale * x, digits) + 0.0:.{digits}f}"
-        for x, (unit, scale) in zip(q, units, strict=True)
+        for x, (unit, scale) in zip(q, shown, strict=True)
         for digits in [1 if unit == "deg" else 3]
     ]
-    kinds = {unit for unit, _ in units}
-    if len(kinds) > 1:
-        return f"q = ({', '.join(f'{text} {unit}' for text, (unit, _) in zip(texts, units, strict=True))})"
-    return f"q = ({', '.join(texts)}) {kinds.pop()}"
+    return f"q = {with_units(texts, [unit for unit, _ in shown])}"
 
 
 def _kept(scene: Scene, start: Start, polytope: Polytope) -> float:

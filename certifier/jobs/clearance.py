@@ -204,7 +204,9 @@ def _sampled(distances: _Distances, polytope: Polytope, inside: Array, seed: int
 
 
 def clearance_in_child(payload: dict[str, Any]) -> dict[str, Any]:
-    """Returns the document of a region's clearance, with the ``proof`` in base 64 or None. A child process runs this function.
+    """Returns the document of a region's clearance, with the ``units`` of joint positions, and the ``proof`` in base 64 or None.
+
+    A child process runs this function.
 
     Args:
         payload: the ``path`` of the region's proof file, and ``processes``, as for :func:`clearance`.
@@ -214,4 +216,8 @@ def clearance_in_child(payload: dict[str, Any]) -> dict[str, Any]:
         ProofError: as :func:`clearance`.
     """
     found = clearance(read_file(payload["path"]), payload["processes"])
-    return {**found.document(), "proof": None if found.proof is None else base64.b64encode(found.proof).decode()}
+    return {
+        **found.document(),
+        "units": [*found.scene.units],
+        "proof": None if found.proof is None else base64.b64encode(found.proof).decode(),
+    }

@@ -13,6 +13,7 @@ from certifier.motion.splines import Curve, curve
 from certifier.positions import check_magnitude
 from certifier.proof import limits
 from certifier.proof.motion import Motion, Space
+from certifier.words import counted
 
 
 def motion_of(scene: Scene, document: Mapping[str, Any], space: Space | None = None) -> Motion:
@@ -50,9 +51,9 @@ def given(scene: Scene, waypoints: Any, coordinates: Space, space: Space | None 
     points = _numbers(scene, waypoints, field)
     space = space or coordinates
     if coordinates is Space.Q and space is Space.S:
-        _check_limits(scene, points, (scene.q_lower, scene.q_upper), field)
+        _check_limits(scene, points, (scene.q_lower, scene.q_upper), Space.Q, field)
         return Motion(space, np.clip(scene.to_s(points), *space.limits(scene)))
-    _check_limits(scene, points, coordinates.limits(scene), field)
+    _check_limits(scene, points, coordinates.limits(scene), coordinates, field)
     return Motion(space, points if space is coordinates else np.clip(scene.to_q(points), *space.limits(scene)))
 
 
@@ -66,8 +67,9 @@ def curved(scene: Scene, found: Curve, space: Space, field: str = "bezier") -> M
     """
     motion = Motion(space, found.controls, found.degree)
     if found.controls.shape[1] != scene.n:
-        hint = f"give {scene.n} numbers for each, {scene.in_order}"
-        raise RegionError("motion_shape", f"the control points have {found.controls.shape[1]} coordinates each", field=field, hint=hint)
+        hint = f"give {counted(scene.n, 'number')} for each, {scene.in_order}"
+        each = counted(found.controls.shape[1], "coordinate")
+        raise RegionError("motion_shape", f"the control points have {each} each", field=field, hint=hint)
     _check_scene(scene, motion.pieces + 1, field)
     lower, upper = space.limits(scene)
     outside = np.argwhere((found.controls < lower) | (found.controls > upper))
@@ -75,8 +77,10 @@ def curved(scene: Scene, found: Curve, space: Space, field: str = "bezier") -> M
         i, j = outside[0]
         piece = min(int(i) // found.degree, motion.pieces - 1)
         k = int(i) - piece * found.degree
+        unit = _unit(scene, space, j)
         place = f"control point {k} of Bezier piece {piece}"
-        problem = f"joint {scene.moving[j].name} is at {found.controls[i, j]:.9g} in {place}, not between {lower[j]:.9g} and {upper[j]:.9g}"
+        ends = f"{lower[j]:.9g} and {upper[j]:.9g}{unit}"
+        problem = f"joint {scene.moving[j].name} is at {found.controls[i, j]:.9g}{unit} in {place}, not between {ends}"
         hint = "all control points must be within the limits, as then all of the motion is; divide a piece whose own are far out"
         raise RegionError("outside_limits", problem, field=f"bezier[{piece}][{k}][{j}]" if field == "bezier" else field, hint=hint)
     return motion
@@ -87,11 +91,11 @@ def _numbers(scene: Scene, waypoints: Any, field: str) -> Array:
         points = np.array(waypoints, dtype=float)
     except (TypeError, ValueError):
         points = None
-    hint = f"give two or more, with {scene.n} numbers each, {scene.in_order}"
+    hint = f"give two or more, with {counted(scene.n, 'number')} each, {scene.in_order}"
     if points is None or points.ndim != 2:
         raise RegionError("motion_shape", "the waypoints are no lists of numbers of one length", field=field, hint=hint)
     if points.shape[1] != scene.n:
-        message = f"each waypoint has {points.shape[1]} numbers, and the scene has {scene.n} joints that move"
+        message = f"each waypoint has {counted(points.shape[1], 'number')}, and the scene has {counted(scene.n, 'joint')} that can move"
         raise RegionError("motion_shape", message, field=field, hint=hint)
     if len(points) < 2:
         raise RegionError("motion_shape", f"a motion has two waypoints or more, not {len(points)}", field=field, hint=hint)
@@ -109,11 +113,17 @@ def _check_scene(scene: Scene, waypoints: int, field: str) -> None:
         raise RegionError("motion_too_long", problem, field=field, hint="divide the motion")
 
 
-def _check_limits(scene: Scene, points: Array, bounds: tuple[Array, Array], field: str) -> None:
+def _check_limits(scene: Scene, points: Array, bounds: tuple[Array, Array], space: Space, field: str) -> None:
     lower, upper = bounds
     outside = np.argwhere((points < lower) | (points > upper))
     if len(outside):
         i, j = outside[0]
-        name = scene.moving[j].name
-        problem = f"joint {name} is at {points[i, j]:.9g} in waypoint {i}, not between {lower[j]:.9g} and {upper[j]:.9g}"
+        name, unit = scene.moving[j].name, _unit(scene, space, j)
+        problem = f"joint {name} is at {points[i, j]:.9g}{unit} in waypoint {i}, not between {lower[j]:.9g} and {upper[j]:.9g}{unit}"
         raise RegionError("outside_limits", problem, field=f"{field}[{i}][{j}]", hint="move it between them; waypoints count from 0")
+
+
+def _unit(scene: Scene, space: Space, joint: int) -> str:
+    """Returns the unit of a joint's coordinate behind a blank; "" for the s of a joint that turns, which has none."""
+    unit = scene.units[joint]
+    return "" if space is Space.S and unit == "rad" else f" {unit}"

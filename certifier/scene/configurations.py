@@ -12,6 +12,7 @@ from certifier.scene.formats.srdf import State
 from certifier.scene.joints import EXACT, by_full_name
 from certifier.scene.mimics import Mimic
 from certifier.scene.semantics import Semantics
+from certifier.words import counted
 
 Given = Mapping[str, float] | tuple[float, ...]
 """Positions by joint, or one for every joint, radians or metres."""
@@ -30,7 +31,7 @@ def own_configurations(scene: Scene, given: Mapping[str, Given]) -> dict[str, di
         field = f"configurations.{name}"
         if isinstance(said, tuple):
             if len(said) != scene.n:
-                message = f"has {len(said)} numbers for {scene.n} joints"
+                message = f"has {counted(len(said), 'number')} for {counted(scene.n, 'joint')}"
                 raise SceneError("scene_field", message, field=field, hint=scene.in_order)
             said = dict(zip(moving, said, strict=True))
         found[name] = by_full_name(said, moving, field, leaders)
@@ -90,27 +91,30 @@ def _of_state(
 
 def _of_followers(scene: Scene, given: Mapping[str, float], positions: dict[str, float], followers: Mapping[str, Mimic]) -> str | None:
     """Adds the positions of leaders of which a state names followers alone, and returns what is wrong with a follower's position."""
+    units = {joint.name: joint.unit for joint in scene.joints}
     for name, mimic in followers.items():
         if name in given:
+            here = f"{given[name]:.9g} {units[name]}"
             if mimic.leader not in positions:
                 meant = (given[name] - mimic.offset) / mimic.factor
                 if wrong := _outside(scene, mimic.leader, meant):
-                    return f"{name} is at {given[name]:.9g}, so {wrong}"
+                    return f"{name} is at {here}, so {wrong}"
                 positions[mimic.leader] = meant
             elif abs(mimic.factor * positions[mimic.leader] + mimic.offset - given[name]) > EXACT:
-                return f"joint {name} is at {given[name]:.9g}, and {mimic.leader}, which it follows, at {positions[mimic.leader]:.9g}"
+                at = f"{positions[mimic.leader]:.9g} {units[mimic.leader]}"
+                return f"joint {name} is at {here}, and {mimic.leader}, which it follows, at {at}"
     return None
 
 
 def _outside(scene: Scene, name: str, value: float) -> str | None:
     """Returns why a joint cannot have a position; None where it can."""
     (i,) = [i for i, joint in enumerate(scene.moving) if joint.name == name]
-    lower, upper = (limits[i] for limits in scene.own_limits)
+    lower, upper, unit = *(limits[i] for limits in scene.own_limits), scene.units[i]
     if not lower - EXACT <= value <= upper + EXACT:
-        return f"joint {name} is at {value:.9g}, not between its limits {lower:.9g} and {upper:.9g}"
+        return f"joint {name} is at {value:.9g} {unit}, not between its limits {lower:.9g} and {upper:.9g} {unit}"
     q = scene.q_star.copy()
     q[i] = value
     if not scene.q_lower[i] - EXACT <= scene.in_windows(q)[i] <= scene.q_upper[i] + EXACT:
-        window = f"{scene.q_lower[i]:.9g} to {scene.q_upper[i]:.9g}"
-        return f"joint {name} is at {value:.9g}, outside of the window from {window} that the scene covers"
+        window = f"{scene.q_lower[i]:.9g} to {scene.q_upper[i]:.9g} {unit}"
+        return f"joint {name} is at {value:.9g} {unit}, outside of the window from {window} that the scene covers"
     return None

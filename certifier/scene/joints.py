@@ -12,6 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from certifier import words
 from certifier.errors import SceneError, close_matches
 from certifier.model import Array, Joint, JointKind
 
@@ -115,7 +116,7 @@ def centered(
         raise SceneError("no_joints", message, field="directives", hint="add a model with joints, or hold fewer of them by fix")
     if q_star is not None and len(q_star) != len(moving):
         names = ", ".join(j.name for j in moving)
-        message = f"has {len(q_star)} numbers for {len(moving)} joints"
+        message = f"has {words.counted(len(q_star), 'number')} for {words.counted(len(moving), 'joint')}"
         behind = [f"{follower} follows {leader}" for follower, leader in (leaders or {}).items()]
         raise SceneError("scene_field", message, field="q_star", hint="; ".join([f"in order: {names}", *behind]))
     centers = [_middle(j) for j in moving] if q_star is None else list(q_star)
@@ -141,7 +142,7 @@ def _windowed(joint: Joint, center: float) -> Joint:
     """Returns a joint with a window where its limits reach half a turn from the centre, or nearly."""
     lower, upper = range_of(joint)
     if lower >= upper:
-        message = f"joint {joint.name} cannot move: its limits are {lower:.9g} and {upper:.9g}"
+        message = f"joint {joint.name} cannot move: its limits are {lower:.9g} and {upper:.9g} {joint.unit}"
         raise SceneError("joint_range", message, field="directives", hint=f"hold it by fix: {{{joint.name}: {lower:g}}}")
     if joint.kind is not JointKind.REVOLUTE:
         if not (np.isfinite(lower) and np.isfinite(upper)):

@@ -15,6 +15,7 @@ from certifier.scene.hollow import beyond, remedy, standing_for
 from certifier.scene.tree import Tree
 from certifier.scene.units import units
 from certifier.verify.decimals import at_most_mm
+from certifier.words import counted
 
 _SAMPLES = 40
 _IGNORED_SAMPLES = 200
@@ -103,7 +104,7 @@ def _windows(scene: Scene) -> list[str]:
 def _off_center(scene: Scene) -> list[str]:
     """Returns a finding about every joint whose q* is outside of its own limits."""
     return [
-        f"q_star of joint {j.name} is {center:.9g}, which is not within its limits, {lower:.9g} to {upper:.9g}"
+        f"q_star of joint {j.name} is {center:.9g} {j.unit}, which is not within its limits, {lower:.9g} to {upper:.9g} {j.unit}"
         for j, center, lower, upper in zip(scene.moving, scene.q_star, *scene.own_limits, strict=True)
         if not lower <= center <= upper
     ]
@@ -176,7 +177,8 @@ def _ignored(scene: Scene, files: Mapping[str, str]) -> list[str]:
             tried = (
                 f"{never} of them touch at none of {_IGNORED_SAMPLES + 1} configurations tried: without the entries, these are certified"
             )
-            found.append(f"{file}: {len(of_file)} pairs of bodies are ignored: {said}{f'; {tried}' if never else ''}")
+            pairs = f"{counted(len(of_file), 'pair')} of bodies {'is' if len(of_file) == 1 else 'are'}"
+            found.append(f"{file}: {pairs} ignored: {said}{f'; {tried}' if never else ''}")
     return found + [
         f"{a} and {b} are ignored, but touch at none of {_IGNORED_SAMPLES + 1} configurations tried: without the entry, they are certified"
         for a, b in sorted(bodies for bodies in apart if reasons[bodies] not in files)

@@ -124,8 +124,8 @@ def _follower(joint: Joint, sweep: Sweep, coupling: Coupling) -> Sweep:
     ends = sorted((found.at(sweep.lower), found.at(sweep.upper)))
     lower, upper = range_of(joint)
     if ends[0] < lower - EXACT or ends[1] > upper + EXACT:
-        limits = f"its limits are {lower:.9g} and {upper:.9g}"
-        message = f"joint {joint.name} follows {sweep.leader} from {ends[0]:.9g} to {ends[1]:.9g}, and {limits}"
+        limits = f"its limits are {lower:.9g} and {upper:.9g} {joint.unit}"
+        message = f"joint {joint.name} follows {sweep.leader} from {ends[0]:.9g} to {ends[1]:.9g} {joint.unit}, and {limits}"
         hint = f"give {sweep.leader} narrower limits: limits: {{{sweep.leader}: [LOWER, UPPER]}}"
         raise SceneError("scene_field", message, field=f"fix.{sweep.leader}", hint=hint)
     return found

@@ -11,6 +11,7 @@ from certifier.collisions.clearance import Clearance
 from certifier.errors import RegionError
 from certifier.model import Array, Pair, Scene
 from certifier.scene.hollow import beyond, remedy, standing_for
+from certifier.words import with_units
 
 SHELLS, EACH = np.geomspace(0.004, 1.0, 12), 40
 """A free configuration is looked for at these parts of the joints' half ranges from the seed, EACH times."""
@@ -69,7 +70,7 @@ def check_free(scene: Scene, q: Array, field: str) -> Nearest:
     else:
         message, hint = condition, "move the seed, or change the condition"
     if found is not None:
-        hint = _said(scene, scene.in_windows(q), found, written(clearance, found, room))
+        hint = _said(scene, scene.in_windows(q), found, written(scene, clearance, found, room))
     raise RegionError("seed_in_collision", message, field=field, hint=hint)
 
 
@@ -140,13 +141,13 @@ def _towards(clearance: Clearance, q: Array, free: Array, room: float) -> Array:
     return inside
 
 
-def written(clearance: Clearance, q: Array, room: float) -> str:
+def written(scene: Scene, clearance: Clearance, q: Array, room: float) -> str:
     """Returns a free configuration as text, with enough decimals to be free with this room when it is read again."""
     for decimals in (4, 6, 9):
         rounded = np.round(q, decimals)
         if clearance.free(rounded, room):
-            return ", ".join(f"{x:.{decimals}f}" for x in rounded)
-    return ", ".join(map(repr, q.tolist()))
+            return with_units([f"{x:.{decimals}f}" for x in rounded], scene.units)
+    return with_units([*map(repr, q.tolist())], scene.units)
 
 
 def _said(scene: Scene, q: Array, found: Array, text: str) -> str:

@@ -44,7 +44,7 @@ def _next_to_contact(scene: Scene, tight: Nearest) -> str:
     room, roomy = next((known for known in found if known[1] is not None), (0.0, None))
     if roomy is None:
         return text
-    return f"{text}; at q = {written(clearance, roomy, room)} every pair is {1e3 * room:g} mm apart or more"
+    return f"{text}; at q = {written(scene, clearance, roomy, room)} every pair is {1e3 * room:g} mm apart or more"
 
 
 def _end_of(pair: Pair) -> str:

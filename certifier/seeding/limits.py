@@ -27,12 +27,15 @@ def check_limits(scene: Scene, q: ArrayLike, field: str = "seed") -> None:
     values, shifted = np.asarray(q, dtype=float), scene.in_windows(q, field)
     for i, (joint, value, own_lower, own_upper) in enumerate(zip(scene.moving, values, *scene.own_limits, strict=True)):
         if not own_lower - ON <= value <= own_upper + ON:
-            message = f"joint {joint.name} is at {value:.9g}, not between its limits {own_lower:.9g} and {own_upper:.9g}"
+            ends = f"{own_lower:.9g} and {own_upper:.9g} {joint.unit}"
+            message = f"joint {joint.name} is at {value:.9g} {joint.unit}, not between its limits {ends}"
             raise RegionError("seed_outside_limits", message, field=f"{field}[{i}]", hint="move it between them")
         if not scene.q_lower[i] - ON <= shifted[i] <= scene.q_upper[i] + ON:
-            window = f"the window from {joint.lower:.9g} to {joint.upper:.9g}"
-            message = f"joint {joint.name} is at {value:.9g}, outside of {window} that the scene covers"
-            raise RegionError("seed_outside_window", message, field=f"{field}[{i}]", hint=f"set q_star of this joint to about {value:.3g}")
+            window = f"the window from {joint.lower:.9g} to {joint.upper:.9g} rad"
+            message = f"joint {joint.name} is at {value:.9g} rad, outside of {window} that the scene covers"
+            raise RegionError(
+                "seed_outside_window", message, field=f"{field}[{i}]", hint=f"set q_star of this joint to about {value:.3g} rad"
+            )
 
 
 def check_in_windows(scene: Scene, q: ArrayLike, field: str) -> None:
@@ -43,7 +46,7 @@ def check_in_windows(scene: Scene, q: ArrayLike, field: str) -> None:
     """
     values, shifted = np.asarray(q, dtype=float), scene.in_windows(q, field)
     for i in np.flatnonzero(np.abs(values - shifted) > ON)[:1]:
-        message = f"joint {scene.moving[i].name} is at {values[i]:.9g}, whole turns away from where the scene has it"
+        message = f"joint {scene.moving[i].name} is at {values[i]:.9g} rad, whole turns away from where the scene has it"
         raise RegionError("seed_outside_window", message, field=f"{field}[{i}]", hint=f"write {shifted[i]:.9g}")
 
 

@@ -20,6 +20,7 @@ from certifier.outcome import Outcome
 from certifier.proof.motion import Motion, Space
 from certifier.seeding.contacts import Contacts
 from certifier.seeding.free import Nearest, named
+from certifier.words import joint_positions
 
 SAMPLES = 2000
 """The hull of three points or more is looked at in this many samples."""
@@ -72,4 +73,4 @@ def _check_hull(scene: Scene, points: Array) -> None:
 
 
 def _touch(scene: Scene, pair: Pair, q: Array) -> str:
-    return f"{trouble(scene, pair, q)} at q = {', '.join(f'{x:.9g}' for x in q)}"
+    return f"{trouble(scene, pair, q)} at q = {joint_positions(q, scene.units, digits=9)}"

@@ -25,6 +25,7 @@ from certifier.seeding.lines import check_lines
 from certifier.seeding.options import Method, SeedOptions
 from certifier.seeding.proposal import Proposal, mend
 from certifier.seeding.tries import best_of_tries
+from certifier.words import counted
 
 
 def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> Nearest:
@@ -36,7 +37,7 @@ def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> Nearest:
     """
     q = np.asarray(q, dtype=float)
     if q.shape != (scene.n,):
-        message = f"it has {q.size} numbers, the scene {scene.n} joints"
+        message = f"it has {counted(q.size, 'number')}, the scene {counted(scene.n, 'joint')}"
         raise RegionError("seed_wrong_length", message, field=field, hint=scene.in_order)
     check_limits(scene, q, field)
     return check_free(scene, q, field)

@@ -31,6 +31,7 @@ from certifier.verify.pair import PairStatement, verify_pair
 from certifier.verify.region import verify_region
 from certifier.verify.separations import Progress, verify_separation
 from certifier.verify.witness import TOLERANCE, verify_witness
+from certifier.words import with_units
 
 LONGEST = 500
 """A text of an error is cut after this many characters."""
@@ -221,9 +222,9 @@ def _dual(data: bytes, scene: Scene, *_: Any) -> tuple[list[str], Guarantee]:
 
 def _witness(data: bytes, scene: Scene, *_: Any) -> tuple[list[str], Guarantee]:
     statement = verify_witness(WitnessProof.from_bytes(data, scene))
-    s, q = (", ".join(map(exactly, values)) for values in (statement.s, scene.to_q(statement.s)))
+    s, q = ([exactly(x) for x in values] for values in (statement.s, scene.to_q(statement.s)))
     touching = f"'{statement.pair.a}' and '{statement.pair.b}', padded, touch at a configuration of the polytope"
-    return [f"{touching}: s = {s}", f"  to rounding, q = {q}"], Guarantee.NUMERIC
+    return [f"{touching}: s = {', '.join(s)}", f"  to rounding, q = {with_units(q, scene.units)}"], Guarantee.NUMERIC
 
 
 _READERS: dict[str, Callable[[bytes, Scene, int, Progress | None], tuple[list[str], Guarantee]]] = {

@@ -21,6 +21,7 @@ from certifier.verify.scene import check_scene, following
 from certifier.verify.separations import Progress, statements
 from certifier.verify.uncovered import not_covered
 from certifier.verify.volume import check_contained
+from certifier.words import counted
 
 
 @dataclass(frozen=True)
@@ -39,18 +40,19 @@ class MapStatement:
     def lines(self) -> list[str]:
         """Returns the statement in plain words."""
         scene = self.scene
-        pairs = len(scene.pairs)
+        pairs, of_bodies = len(scene.pairs), counted(len(scene.body_pairs), "pair")
+        cells = counted(self.cells, "cell")
         free = (
-            f"{self.missing} of {pairs} pairs have no cells: no configuration is proved to be free"
+            f"{self.missing} of {pairs} pairs {'has' if self.missing == 1 else 'have'} no cells: no configuration is proved to be free"
             if self.missing
             else NO_PAIRS
             if not scene.body_pairs
-            else f"{len(scene.body_pairs)} pairs of bodies; a configuration is free of collision if it is in a cell of each of them"
+            else f"{of_bodies} of bodies; a configuration is free of collision if it is in a cell of each of them"
         )
         return [
             f"scene of hash {scene.hash}",
             *following(scene),
-            f"a map of {self.cells} cells of the joint space within the joint limits; in each of them, a pair of bodies is apart",
+            f"a map of {cells} of the joint space within the joint limits; in each of them, a pair of bodies is apart",
             free,
             *([] if self.missing else [f"there, {line}" for line in conditions(scene)]),
             *paddings(scene),

@@ -23,7 +23,7 @@ import numpy as np
 from certifier.errors import ProofError
 from certifier.model import Array, Scene
 from certifier.proof import limits
-from certifier.proof.motion import Motion, MotionProof
+from certifier.proof.motion import Motion, MotionProof, Space
 from certifier.verify.chains import UP, poses
 from certifier.verify.conditions import conditions
 from certifier.verify.decimals import exactly, rounded_down
@@ -31,6 +31,7 @@ from certifier.verify.pieces import Pieces
 from certifier.verify.scene import check_scene, following
 from certifier.verify.sides import Known, Sides
 from certifier.verify.uncovered import not_covered
+from certifier.words import with_units
 
 BLOCK = 1 << 14
 """At most this many intervals are looked at together."""
@@ -57,8 +58,10 @@ class MotionStatement:
     def lines(self) -> list[str]:
         """Returns the statement in plain words, without the scene."""
         motion, scene = self.motion, self.scene
-        start, end = (", ".join(map(exactly, motion.controls[i])) for i in (0, -1))
+        start, end = (_place(scene, motion, i) for i in (0, -1))
         names = ", ".join(f"'{joint.name}'" for joint in scene.moving)
+        pairs = len(scene.body_pairs)
+        every = "the scene's one pair" if pairs == 1 else f"each of the scene's {pairs} pairs"
         digest = hashlib.sha256(np.ascontiguousarray(motion.controls).tobytes()).hexdigest()
         part = "all along it" if self.end == 1.0 else f"from its beginning to the part {exactly(self.end)} of its last piece"
         tube = f"at every configuration whose joints are within {exactly(self.rho)} rad or m of this at a time, all one number"
@@ -70,14 +73,20 @@ class MotionStatement:
             f"a motion {what}:",
             f"  joints {names}, all {points} within their limits",
             *following(scene),
-            f"  from {motion.space.value} = {start}",
-            f"  to {motion.space.value} = {end}",
+            f"  from {start}",
+            f"  to {end}",
             f"  SHA-256 of the {points} as doubles: {digest}",
-            f"{part} the padded bodies of each of the scene's {len(scene.body_pairs)} pairs are at least {rounded_down(self.gap)} m apart",
+            f"{part} the padded bodies of {every} are at least {rounded_down(self.gap)} m apart",
             *([f"and {tube}, beyond the limits as well"] if self.rho else []),
             *conditions(scene, beyond_limits=self.rho > 0),
             *not_covered(scene),
         ]
+
+
+def _place(scene: Scene, motion: Motion, index: int) -> str:
+    """Returns a control point in words. Of coordinates s, those of joints that turn have no unit, so it gives none."""
+    texts = [exactly(x) for x in motion.controls[index]]
+    return f"q = {with_units(texts, scene.units)}" if motion.space is Space.Q else f"s = {', '.join(texts)}"
 
 
 class MotionVerifier:

@@ -24,6 +24,7 @@ from certifier.verify.pair import check_ground
 from certifier.verify.scene import check_scene, following
 from certifier.verify.separations import Progress, statements
 from certifier.verify.uncovered import not_covered
+from certifier.words import counted
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ class RegionStatement:
             *joints,
             *following(scene),
             f"a bounded, non-empty polytope of {self.faces} half-spaces in tangent space; |s|^2 <= {rounded_up(self.N, 6)}",
-            f"{len(gaps)} pairs of bodies separated at every configuration of it" if gaps else NO_PAIRS,
+            f"{counted(len(gaps), 'pair')} of bodies separated at every configuration of it" if gaps else NO_PAIRS,
             *conditions(scene),
             *paddings(scene),
             *([f"least distance, padded, at least {rounded_down(self.gap)} m: '{closest.a}' and '{closest.b}'"] if closest else []),

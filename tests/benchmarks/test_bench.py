@@ -81,8 +81,8 @@ def test_a_region_that_cannot_be_grown_is_a_row_that_says_why(monkeypatch: pytes
     monkeypatch.setattr(catalogue, "seed", lambda _: np.array([9.0, 0.0]))
     document = growth.growth(["planar_2dof"], against=False, limit=growth.LIMIT, progress=lambda _: None)
     assert [row["ellipsoid"] for row in document["ways"]] == [0, 0]
-    assert all("is at 9," in row["ended"] for row in document["ways"])
-    assert "is at 9," in report.text(document)
+    assert all("is at 9 rad," in row["ended"] for row in document["ways"])
+    assert "is at 9 rad," in report.text(document)
 
 
 def test_a_way_that_takes_too_long_is_a_row_that_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

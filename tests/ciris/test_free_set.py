@@ -190,7 +190,7 @@ def test_nothing_beyond_the_limits_is_free(tmp_path: Path) -> None:
     assert found.contains([[2.0, 0, 0], [np.nextafter(2.0, 3), 0, 0]]).tolist() == [True, False]
     assert not found.contains_motion([0, 0, 0], [0, 2.1, 0])
     assert not found.contains_motion(np.full(N, 1e308), np.full(N, -1e308))
-    with pytest.raises(RegionError, match=r"b is 2\.1, beyond its limits") as error:
+    with pytest.raises(RegionError, match=r"b is 2\.1 rad, beyond its limits .its limits are -2 and 2 rad.") as error:
         found.open_parts([0, 0, 0], [0, 2.1, 0])
     assert (error.value.code, error.value.field) == ("outside_limits", "end")
 

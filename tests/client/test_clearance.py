@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,7 @@ def test_the_clearance_of_a_region_is_printed_and_its_proof_kept(ciris: Ciris, p
     assert (done.status, done.stderr) == (0, "")
     for word in ("clearance  at least", "closest", "mm apart", "q = ", f"check it: ciris verify {kept}"):
         assert word in done.stdout
+    assert re.search(r"q = \(\S+\) rad$", done.stdout, re.MULTILINE)
     found = ciris("clearance", proof, "--json").json
     assert 0.9 * 0.02 <= found["clearance"] <= 0.02
     assert (found["tight"], found["proof"]) == (True, None)

@@ -93,8 +93,8 @@ def files(tmp_path: Path) -> Path:
         (("grow", "broken.yaml", "--q", "0,0"), "broken.yaml, line 2"),
         (("grow", "broken.yaml"), "--q: no seed was given"),
         (("grow", PLANAR, "--q", "0,nan"), "--q[1]: 'nan' is not a finite number"),
-        (("grow", PLANAR, "--q", "0"), "2 joints"),
-        (("grow", PLANAR, "--q", "0,9"), "--q[1]: joint arm/elbow is at 9"),
+        (("grow", PLANAR, "--q", "0"), "it has 1 number, the scene 2 joints"),
+        (("grow", PLANAR, "--q", "0,9"), "--q[1]: joint arm/elbow is at 9 rad, not between its limits"),
         (("grow", PLANAR, "--q", "-1.2,1.0"), "arm/lower/bar and obstacles/body/post overlap"),
         (("grow", PLANAR, "--method", "magic"), "--method"),
         (("grow", PLANAR, "--deadline", "0"), "--deadline: must be a number above 0"),
@@ -228,7 +228,7 @@ def test_bodies_that_are_too_close_are_no_collision(ciris: Ciris, files: Path, m
     monkeypatch.setattr(local, "certify", lambda *_: Verdict({0: near}, Guarantee.EXACT, 0.1))
     done = ciris("certify", PLANAR, "--polytope", "small.npz", "--local", "--cells", "300")
     assert done.status == 1
-    assert f"arm/lower/bar and obstacles/body/block: {detail}, at q = 0, 0\n" in done.stdout
+    assert f"arm/lower/bar and obstacles/body/block: {detail}, at q = (0, 0) rad\n" in done.stdout
     assert "collision" not in done.stdout
     assert done.stdout.splitlines()[-1].startswith("planar-2dof: too close, guarantee none")
 
@@ -266,7 +266,7 @@ def test_a_collision_is_a_negative_answer_with_its_witness(ciris: Ciris, tmp_pat
     write(tmp_path / "all.npz", C=np.zeros((0, 2)), d=np.zeros(0))
     done = ciris("certify", PLANAR, "--polytope", "all.npz", "--local")
     assert done.status == 1
-    assert "arm/lower/bar and obstacles/body/block touch at q = " in done.stdout
+    assert "arm/lower/bar and obstacles/body/block touch at q = (" in done.stdout
     assert done.stdout.splitlines()[-1].startswith("planar-2dof: refuted, guarantee none")
 
 
@@ -396,8 +396,8 @@ def test_contains_answers_by_its_exit_status(ciris: Ciris, url: str, region: str
     assert [point.get("trouble") for point in outside.json["points"]] == [None, [], ["the joint model/slide is beyond its limits"]]
     told = ciris("contains", "slider", *["--q=0.9"] * 101, "--q=5", CIRIS_URL=url).stdout.splitlines()
     assert told == [
-        *["outside: 0.9 is in none of 1 regions, though floating point finds nothing wrong there"] * 101,
-        "outside: 5 is in none of 1 regions: the joint model/slide is beyond its limits",
+        *["outside: 0.9 is not in the scene's one region, though floating point finds nothing wrong there"] * 101,
+        "outside: 5 is not in the scene's one region: the joint model/slide is beyond its limits",
     ]
     wrong = ciris("contains", "slider", "--q", "0,1", CIRIS_URL=url)
     assert (wrong.status, wrong.error.startswith("--q[0]: 2 numbers were given")) == (2, True)

@@ -23,8 +23,8 @@ COVERAGE = {"value": 0.5, "stderr": 0.01, "samples": 100}
     ("arguments", "error"),
     [
         (["--connect", "0"], "--connect: at least two configurations can be connected, and one was given"),
-        (["--connect", "0", "--connect", "-0.2,1"], "--connect[1]: 2 numbers were given; the scene has 1 joints"),
-        (["--seed", "5"], "--seed[0][0]: joint model/slide is at 5, not between its limits -1 and 1"),
+        (["--connect", "0", "--connect", "-0.2,1"], "--connect[1]: 2 numbers were given; the scene has 1 joint"),
+        (["--seed", "5"], "--seed[0][0]: joint model/slide is at 5 m, not between its limits -1 and 1 m"),
     ],
 )
 def test_what_makes_no_sense_is_bad_input(ciris: Ciris, url: str, scene: Scene, arguments: list[str], error: str) -> None:

@@ -44,7 +44,7 @@ def test_jobs_are_listed_shown_and_followed_by_the_first_characters_of_their_ids
     told, copied = (line.strip() for line in ciris("job", "show", short).stdout.splitlines()[-2:])
     assert told.startswith("model/cart/ball and world/post1 touch at q = (0.250) m, as floating point says. 1 face was added or ")
     assert told.endswith("cut off 12 % of the polytope, as samples say.")
-    assert copied == "--q=0.25"
+    assert copied == "in m: --q=0.25"
     followed = ciris("job", "follow", short)
     assert (followed.status, "succeeded" in followed.stdout) == (0, True)
     assert ciris("region", "show", region[:8], "--json").json["guarantee"] == "exact"

@@ -16,7 +16,7 @@ from tests.client.conftest import PLANAR, Ciris
 def test_a_map_is_grown_and_its_file_holds(ciris: Ciris, tmp_path: Path) -> None:
     done = ciris("map", PLANAR, "--local", "--coverage", "0.5", "--at", "0,0", "--out", "planar.proof")
     assert done.status == 0
-    assert "q = 0, 0: proved" in done.stdout
+    assert "q = (0, 0) rad: proved" in done.stdout
     assert "% of the free configurations proved" in done.stdout
     assert "check it: ciris verify planar.proof" in done.stdout
     checked = ciris("verify", "planar.proof", "--json")
@@ -101,7 +101,7 @@ def test_a_scene_in_which_bodies_always_touch_says_so(ciris: Ciris, tmp_path: Pa
     done = ciris("map", "scene.yaml", "--local", "--at", "0")
     assert done.status == 1, done.error
     assert "no configuration was found that is free of collision, 0 cells" in done.stdout
-    assert "q = 0: in collision" in done.stdout
+    assert "q = (0) rad: in collision" in done.stdout
 
 
 def test_bad_input_is_named(ciris: Ciris, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,7 @@ def test_a_contact_is_a_negative_answer_with_the_time_of_the_file(ciris: Ciris, 
     assert found["stop"]["t"] == pytest.approx(10 + 2 * found["stop"]["time"])
     done = ciris("certify-path", PLANAR, "--path", path, "--local")
     assert "touch" in done.stdout
+    assert re.search(r"^q = \(\S+, \S+\) rad$", done.stdout, re.MULTILINE)
     assert "all pairs are certified up to" in done.stdout
 
 
@@ -119,7 +121,7 @@ def test_clearance_and_padding_are_printed_here_and_by_the_service(ciris: Ciris,
     [
         (["--local"], "--path: a motion needs its waypoints"),
         (["--q", "0,0", "--local"], "a motion has two waypoints or more, not 1 (give two or more, with 2 numbers each, in order: arm/"),
-        (["--q", "0,0,0,0", "--q", "0,0,0,0", "--local"], "--q: each waypoint has 4 numbers, and the scene has 2 joints that move"),
+        (["--q", "0,0,0,0", "--q", "0,0,0,0", "--local"], "--q: each waypoint has 4 numbers, and the scene has 2 joints that can move"),
         (["--q", "0,0", "--q", "0", "--local"], "different numbers of joints"),
         (["--q", "0,0", "--q", "0,x", "--local"], "--q 1[1]: 'x' is not a finite number"),
         (["--q", "0,0", "--q", "0,99", "--local"], "--q[1][1]: joint "),

@@ -41,7 +41,7 @@ def test_the_commands_that_ask_a_service_take_names(ciris: Ciris, url: str, name
     plan = ciris("plan", "slider", "--from", "home", "--to", "away", "--regions-only", "--json", CIRIS_URL=url).json
     assert (plan["q"][0], plan["q"][-1]) == ([-0.1], [0.15])
     assert ciris("path", "slider", "--q", "home", "--q", "0", "--q", "away", CIRIS_URL=url).status == 0
-    assert "configuration home: model/slide -0.1" in ciris("scene", "show", "slider", CIRIS_URL=url).stdout.splitlines()
+    assert "configuration home: model/slide -0.1 m" in ciris("scene", "show", "slider", CIRIS_URL=url).stdout.splitlines()
     assert ciris("plan", "slider", "--from", "hom", "--to", "away", CIRIS_URL=url).error == (
         "--from: the scene has no configuration 'hom' (did you mean home?)"
     )
@@ -151,7 +151,7 @@ def test_without_a_service_names_are_those_of_the_scene_file(ciris: Ciris, tmp_p
     done = ciris("scene", "check", path, "--q", "home", "--json")
     assert done.json["q"] == [0.5]
     assert done.json["configurations"]["away"] == {"arm/turn": 1.5}
-    assert "configuration home: arm/turn 0.5" in ciris("scene", "check", path).stdout.splitlines()
+    assert "configuration home: arm/turn 0.5 rad" in ciris("scene", "check", path).stdout.splitlines()
     (tmp_path / "seed.yaml").write_text("q: away\n")
     assert ciris("scene", "check", path, "--json").json["q"] == [1.5]
     assert ciris("scene", "check", path, "--q", "home,away").error.startswith("--q: 'home' has joint arm/turn at 0.5, and 'away' at 1.5")

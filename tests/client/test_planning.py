@@ -24,7 +24,7 @@ def test_nearest_says_how_far_the_nearest_region_is(ciris: Ciris, url: str, regi
     assert (done.status, done.stderr) == (0, "")
     inside, outside = done.stdout.splitlines()
     assert inside == f"0.1: inside {region} (exact)"
-    assert outside == f"-0.8: 0.5 in s from {region} (exact), whose nearest point is -0.3"
+    assert outside == f"-0.8: 0.5 in s from {region} (exact), whose nearest point is (-0.3) m"
     assert ciris("nearest", "slider", "--q", "0.1", "--json", CIRIS_URL=url).json["points"][0]["nearest"]["region"] == region
 
 
@@ -45,8 +45,8 @@ def test_a_path_is_answered_by_the_exit_status(ciris: Ciris, url: str, region: s
     beyond = ciris("path", "slider", "--q", "-0.4", "--q", "0.1", "--space", "s", CIRIS_URL=url)
     assert beyond.status == 1
     assert beyond.stdout.splitlines() == [
-        "not covered from 0 on, at q = -0.4",
-        f"next: 0.1 in s from {region} (exact), whose nearest point is -0.3",
+        "not covered from 0 on, at q = (-0.4) m",
+        f"next: 0.1 in s from {region} (exact), whose nearest point is (-0.3) m",
     ]
     assert ciris("path", "slider", "--q", "-0.4", "--q", "0.1", "--json", CIRIS_URL=url).json["covered"] is False
     curve = tmp_path / "curve.json"
@@ -68,8 +68,9 @@ def test_the_graph_shows_overlaps_and_gaps(ciris: Ciris, url: str, region: str, 
     done = ciris("graph", "slider", CIRIS_URL=url)
     assert (done.status, done.stderr) == (0, "")
     assert done.stdout.splitlines()[0] == "regions: 3, overlaps: 1, components: 2"
-    assert f"{region}  {more}   0.05  0.15" in done.stdout
-    assert done.stdout.splitlines()[-1] in [f"gap of 0.2 in s between {a} and {b}; try the seed 0.5" for a, b in ((more, far), (far, more))]
+    assert f"{region}  {more}   0.05  (0.15) m" in done.stdout
+    gaps = [f"gap of 0.2 in s between {a} and {b}; try the seed (0.5) m" for a, b in ((more, far), (far, more))]
+    assert done.stdout.splitlines()[-1] in gaps
     assert ciris("graph", "slider", "--json", CIRIS_URL=url).json["complete"] is True
 
 
@@ -94,7 +95,7 @@ def test_a_plan_is_printed_with_its_regions(ciris: Ciris, url: str, region: str,
     header, first, second, what, verdict = done.stdout.splitlines()
     assert header.split() == ["from", "to", "proved", "by", "guarantee"]
     assert [first.split()[0], first.split()[3], second.split()[3]] == ["0", region, more]
-    assert " configurations, 0.5 long in q, " in what
+    assert " configurations, 0.5 long in q (m), " in what
     assert verdict == "all of the motion lies in certified regions, guarantee exact"
     found = ciris("plan", "slider", "--from=-0.2", "--to", more, "--json", CIRIS_URL=url).json
     assert (found["found"], found["q"][0], found["t"][0]) == (True, [-0.2], 0.0)
@@ -115,17 +116,17 @@ def test_a_plan_that_is_not_found_says_why(ciris: Ciris, url: str, region: str, 
     apart = ciris("plan", "slider", "--from", "0.1", "--to", "0.7", "--regions-only", CIRIS_URL=url)
     assert (apart.status, apart.stdout) == (
         1,
-        f"1 of 2 regions are connected with --from, 1 with --to\ngap of 0.4 in s between {region} and {far}; try the seed 0.4\n",
+        f"1 of 2 regions are connected with --from, 1 with --to\ngap of 0.4 in s between {region} and {far}; try the seed (0.4) m\n",
     )
     outside = ciris("plan", "slider", "--from", "0.1", "--to", "-0.8", "--regions-only", CIRIS_URL=url)
     assert (outside.status, outside.stdout) == (
         1,
-        f"--to is in no certified region; nearest: 0.5 in s from {region} (exact), whose nearest point is -0.3\n",
+        f"--to is in no certified region; nearest: 0.5 in s from {region} (exact), whose nearest point is (-0.3) m\n",
     )
     wrong = ciris("plan", "slider", "--from", "0.1,0.2", "--to", "far", CIRIS_URL=url)
     assert (wrong.status, wrong.error.partition(" (")[0]) == (2, "--to: the scene has no configuration 'far'")
     longer = ciris("plan", "slider", "--from", "0.1,0.2", "--to", "0.1", CIRIS_URL=url)
-    assert (longer.status, longer.error.partition(" (")[0]) == (2, "--from: 2 numbers were given; the scene has 1 joints")
+    assert (longer.status, longer.error.partition(" (")[0]) == (2, "--from: 2 numbers were given; the scene has 1 joint")
 
 
 def test_without_regions_a_motion_is_planned_and_its_proof_kept(ciris: Ciris, url: str, scene: Scene, tmp_path: Path) -> None:
@@ -133,7 +134,7 @@ def test_without_regions_a_motion_is_planned_and_its_proof_kept(ciris: Ciris, ur
     assert (done.status, done.stderr) == (0, "")
     header, piece, what, verdict, proof = done.stdout.splitlines()
     assert (header.split()[2:4], piece.split()[2]) == (["proved", "by"], "motion")
-    assert " configurations, 0.9 long in q, " in what
+    assert " configurations, 0.9 long in q (m), " in what
     assert verdict == "all of the motion is proved to be free of collision, guarantee exact"
     assert proof == f"proof: {tmp_path / 'p'} (check it: ciris verify {tmp_path / 'p'})"
     assert ciris("verify", tmp_path / "p").status == 0
@@ -141,7 +142,7 @@ def test_without_regions_a_motion_is_planned_and_its_proof_kept(ciris: Ciris, ur
 
 def test_what_is_wrong_with_the_ends_is_said_in_words(ciris: Ciris, url: str, scene: Scene) -> None:
     beyond = ciris("plan", "slider", "--from", "0.1", "--to", "1.5", CIRIS_URL=url)
-    assert (beyond.status, beyond.stdout) == (1, "--to: joint model/slide is at 1.5, and its limits are from -1 to 1\n")
+    assert (beyond.status, beyond.stdout) == (1, "--to: joint model/slide is at 1.5 m, and its limits are from -1 to 1 m\n")
     pose = ("--to-pose", "0.5,0,0,0,0,0", "--frame", "cart")
     there = ciris("plan", "slider", "--from", "0.1", *pose, "--json", CIRIS_URL=url).json
     assert there["q"][-1] == [pytest.approx(0.5)]

@@ -52,7 +52,7 @@ def test_a_draft_of_a_robot_as_people_ship_it_is_a_scene_with_a_free_seed(ciris:
     checked = ciris("scene", "check", out)
     assert checked.status == 0
     for words in (
-        "1 joints",
+        "1 joint, ",
         "window",
         "ignored: arm/base/foot and arm/cover/Sphere",
         "nothing touches at seed.yaml",
@@ -150,7 +150,7 @@ def test_a_second_scene_of_a_directory_has_a_seed_of_its_own(ciris: Ciris, tmp_p
     assert "other.seed.yaml" in ciris("scene", "check", "other.yaml").error
     assert "nothing touches at seed.yaml" in ciris("scene", "check", "scene.yaml").stdout
     (tmp_path / "other.seed.yaml").write_text("q: [0, 0]\n")
-    assert "other.seed.yaml: q: it has 2 numbers, the scene 1 joints" in ciris("grow", "other.yaml", "--local").error
+    assert "other.seed.yaml: q: it has 2 numbers, the scene 1 joint" in ciris("grow", "other.yaml", "--local").error
     (tmp_path / "other.seed.yaml").write_text("q: [1e9]\n")
     assert "other.seed.yaml: q[0]: 1000000000.0 is no number of at most 1e+06" in ciris("grow", "other.yaml", "--local").error
     assert "--q: it has 2 numbers" in ciris("grow", "other.yaml", "--q", "0,0", "--local").error
@@ -242,7 +242,7 @@ def test_a_check_says_what_touches(ciris: Ciris, tmp_path: Path) -> None:
     assert done.status == 1
     assert "touching at --q: arm/hand/palm and room/walls/wall" in done.stdout
     for q, words in (
-        ("0,0", "2 numbers for 1 joints"),
+        ("0,0", "2 numbers for 1 joint"),
         ("5", "not between its limits"),
         ("x", "no configuration 'x'"),
         ("0,x", "not a finite number"),

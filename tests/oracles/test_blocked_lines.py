@@ -36,7 +36,7 @@ def test_drake_finds_contact_where_a_line_is_refused_and_none_where_it_is_not(na
         a, b = [q for q in rng.uniform(scene.q_lower, scene.q_upper, (300, scene.n)) if drake.free(q, 1e-3)][:2]
         said = refusal(scene, a, b)
         if said:
-            named = re.search(r": (\S+) and (\S+) touch at q = (.+), on the straight line in s from the seed to this", said)
+            named = re.search(r": (\S+) and (\S+) touch at q = \((.+)\) rad, on the straight line in s from the seed to this", said)
             assert named is not None, said
             distance, pair = drake.least(np.array([float(x) for x in named[3].split(",")]))
             assert distance < 1e-6

@@ -74,4 +74,4 @@ def test_what_did_not_change_is_carried_over_and_a_seed_in_contact_revokes_the_r
     assert (gone.state, gone.outcome, gone.region_id) == ("failed", "refuted", None)
     assert gone.error is not None
     assert gone.error["code"] == "revoked"
-    assert "touch at q = (0, 0)" in gone.error["message"]
+    assert "touch at q = (0.0, 0.0) deg" in gone.error["message"]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from certifier.model import Array
 from certifier.scene.meshes.mesh import EXPORT, Mesh, refuse
 from certifier.scene.xml import parse_xml
+from certifier.words import counted
 
 _MAX_DEPTH = 50
 _MAX_POINTS = 5_000_000
@@ -157,7 +158,7 @@ class _Document:
     def _transform(self, element: _Element) -> Array:
         numbers = self._numbers(element)
         if len(numbers) != _TRANSFORMS[element.name]:
-            self._refuse(element, f"<{element.name}> has {len(numbers)} numbers instead of {_TRANSFORMS[element.name]}")
+            self._refuse(element, f"<{element.name}> has {counted(len(numbers), 'number')} instead of {_TRANSFORMS[element.name]}")
         X = np.eye(4)
         match element.name:
             case "matrix":
@@ -193,7 +194,7 @@ class _Document:
             self._refuse(mesh, f"<mesh> has {len(vertices)} <vertices> instead of 1")
         positions = [entry for entry in vertices[0].all("input") if entry.attributes.get("semantic") == "POSITION"]
         if len(positions) != 1:
-            self._refuse(vertices[0], f"<vertices> has {len(positions)} positions instead of 1")
+            self._refuse(vertices[0], f"<vertices> has {counted(len(positions), 'position')} instead of 1")
         points = self._source(self._named(positions[0], "source", "source"))
         triangles: list[tuple[int, int, int]] = []
         for part in mesh.children:
@@ -215,7 +216,7 @@ class _Document:
             self._refuse(accessor, "<accessor> names the numbers of another <source>")
         numbers = self._numbers(array)
         if (count := self._count(array, "count")) != len(numbers):
-            self._refuse(array, f"<float_array> has {len(numbers)} numbers, and its count is {count}")
+            self._refuse(array, f"<float_array> has {counted(len(numbers), 'number')}, and its count is {count}")
         axes = [param.attributes.get("name", "").upper() for param in accessor.all("param")]
         stride, offset = self._count(accessor, "stride", 1), self._count(accessor, "offset", 0)
         if axes != ["X", "Y", "Z"] or stride != 3:
@@ -242,12 +243,12 @@ class _Document:
             corners = numbers[0] if len(numbers) == 1 else []
             sizes = [3] * count if part.name == "triangles" else [n for entry in part.all("vcount") for n in self._integers(entry)]
             if len(sizes) != count or sum(sizes) != len(corners):
-                what = f"<{part.name}> counts {count} faces, and has {len(corners)} corners in {len(numbers)} lists"
-                self._refuse(part, what)
+                faces, in_lists = counted(count, "face"), counted(len(numbers), "list")
+                self._refuse(part, f"<{part.name}> counts {faces}, and has {counted(len(corners), 'corner')} in {in_lists}")
             following = iter(corners)
             numbers = [list(itertools.islice(following, size)) for size in sizes]
         elif len(numbers) != count:
-            self._refuse(part, f"<{part.name}> has {len(numbers)} faces, and its count is {count}")
+            self._refuse(part, f"<{part.name}> has {counted(len(numbers), 'face')}, and its count is {count}")
         for face in numbers:
             if len(face) < 3 or min(face) < 0 or max(face) >= points:
                 self._refuse(part, f"a face has the corners {', '.join(map(str, face[:8])) or 'none'}, and there are {points} points")
@@ -256,7 +257,7 @@ class _Document:
     def _whole(self, lists: list[_Element], width: int) -> Iterator[_Element]:
         for entry in lists:
             if len(entry.text.split()) % width:
-                self._refuse(entry, f"<p> has {len(entry.text.split())} numbers, which is no multiple of {width}")
+                self._refuse(entry, f"<p> has {counted(len(entry.text.split()), 'number')}, which is no multiple of {width}")
             yield entry
 
     def _named(self, element: _Element, key: str, kind: str) -> _Element:

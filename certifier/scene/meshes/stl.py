@@ -8,6 +8,7 @@ import numpy as np
 
 from certifier.model import Array
 from certifier.scene.meshes.mesh import Mesh, refuse
+from certifier.words import counted
 
 _HEAD = 84
 """A binary file begins with this many bytes, of which the last four count the triangles."""
@@ -44,7 +45,7 @@ def read_stl(data: bytes, name: str) -> Mesh:
     elif data.lstrip()[:5].lower() == b"solid" and b"\0" not in data:
         corners = _text(data, name)
     elif len(data) < _HEAD:
-        refuse(name, f"this is no STL: it has {len(data)} bytes, and binary STL has {_HEAD} before the first triangle")
+        refuse(name, f"this is no STL: it has {counted(len(data), 'byte')}, and binary STL has {_HEAD} before the first triangle")
     else:
         needed = _HEAD + count * _TRIANGLE.itemsize
         refuse(name, f"the file has {len(data)} bytes, and the {count} triangles that it counts need {needed}")
@@ -75,13 +76,13 @@ def _text(data: bytes, name: str) -> Array:
         if statement not in _NEXT[before]:
             refuse(where, f"{_shown(raw)} stands where {' or '.join(word.decode() for word in _NEXT[before])} must stand")
         if len(words) != _WORDS.get(statement, len(words)):
-            refuse(where, f"{_shown(raw)} has {len(words)} words instead of {_WORDS[statement]}")
+            refuse(where, f"{_shown(raw)} has {counted(len(words), 'word')} instead of {_WORDS[statement]}")
         if statement == b"outer":
             begun = len(corners)
         elif statement == b"vertex":
             corners.append(_vertex(words[1:], where))
         elif statement == b"endloop" and len(corners) - begun != 3:
-            refuse(where, f"the facet has {len(corners) - begun} vertices instead of 3")
+            refuse(where, f"the facet has {counted(len(corners) - begun, 'vertex', 'vertices')} instead of 3")
         before = statement
     if before != b"endsolid":
         refuse(f"{name}:{line}", "the file ends before endsolid")

@@ -69,7 +69,7 @@ def check(scene: Scene, q: Array, grows: Callable[[Array], bool]) -> None:
         return
     assert {pair.a, pair.b} == set(re.search(r"from contact of (\S+) and (\S+), and no", said).groups())
     assert float(re.search(r"is (\S+) mm from", said)[1]) == pytest.approx(1e3 * distance, rel=0.01)
-    named = re.search(r"at q = ([^a-z]+) every pair is (\S+) mm", said)
+    named = re.search(r"at q = \(([^a-z]+)\) rad every pair is (\S+) mm", said)
     if named:
         roomy = np.array([float(x) for x in named[1].split(",")])
         assert Clearance(scene).least(roomy)[0] > 0.99e-3 * float(named[2])

@@ -319,7 +319,7 @@ def test_states_of_makers_count_where_their_joints_are_together(tmp_path):
     scene = parsed(write(tmp_path, more=jaws("prismatic", -1, 0.0), extra=IGNORED + "srdf: {arm: arm.srdf}\n", files=files))
     assert scene.configurations == {"arm/hand/open": {"arm/grip": 0.1}, "arm/hand/half": {"arm/grip": 0.05}}
     (said,) = [w for w in scene.warnings if "is left out" in w]
-    assert "joint arm/other is at 0.1, and arm/grip, which it follows, at 0.1" in said
+    assert "joint arm/other is at 0.1 m, and arm/grip, which it follows, at 0.1 m" in said
 
 
 def test_drakes_methods_have_independent_joints_only(tmp_path):

@@ -63,7 +63,7 @@ def test_a_joint_that_turns_far_has_a_window_about_q_star(tmp_path, change, extr
     assert (turn.lower, turn.upper) == pytest.approx((lower, upper))
     assert turn.lower < scene.q_star[0] + np.pi
     assert any(w.startswith("joint arm/turn may turn 179 degrees from q*") for w in scene.warnings)
-    outside = any(w == "q_star of joint arm/turn is -2, which is not within its limits, -1 to 2" for w in scene.warnings)
+    outside = any(w == "q_star of joint arm/turn is -2 rad, which is not within its limits, -1 to 2 rad" for w in scene.warnings)
     assert outside is (extra == "q_star: [-2]\n")
     again = Scene.from_document(scene.to_document())
     assert again.moving[0].own_limits == own

@@ -164,7 +164,7 @@ def floating(scene=SCENE):
         ({"extra": "q_star: [6]\n"}, "joint_range", "q_star", "arm/turn turns from -1 to 2 rad"),
         ({"kind": "prismatic", "limit": '<limit effort="1" velocity="1"/>'}, "joint_range", "directives", "arm/turn"),
         ({"limit": LIMIT.replace('"2"', '"-1"')}, "joint_range", "directives", "arm/turn cannot move"),
-        ({"extra": "q_star: [0, 0]\n"}, "scene_field", "q_star", "2 numbers for 1 joints (in order: arm/turn)"),
+        ({"extra": "q_star: [0, 0]\n"}, "scene_field", "q_star", "2 numbers for 1 joint (in order: arm/turn)"),
         ({"kind": "fixed", "limit": ""}, "no_joints", "directives", "no joint"),
         ({"kind": "planar"}, "unsupported_joint", "directives", "arm.urdf:3: joint 'turn' is a 'planar' joint"),
         ({"kind": "planar"}, "unsupported_joint", "directives", "two slides and a turn"),

@@ -121,7 +121,7 @@ def test_states_are_configurations_and_those_that_cannot_be_are_left_out_with_a_
     }
     left_out = {w.split("the state ")[1].split(" is left out: ")[0]: w for w in made.warnings if "left out" in w}
     assert list(left_out) == ["arm/all/far", "arm/all/moved", "arm/all/odd", "arm/all/a,b", "arm/all/none"]
-    assert "joint arm/j1 is at 2.001, not between its limits -2 and 2" in left_out["arm/all/far"]
+    assert "joint arm/j1 is at 2.001 rad, not between its limits -2 and 2 rad" in left_out["arm/all/far"]
     assert "held at 0.25, and the state has it at 0.26" in left_out["arm/all/moved"]
     assert "did you mean arm/j1" in left_out["arm/all/odd"]
     assert all(warning.startswith("arm.srdf:3: ") for warning in left_out.values())

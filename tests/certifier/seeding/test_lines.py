@@ -80,7 +80,7 @@ def test_a_line_is_refused_exactly_where_trigonometry_says_that_it_touches(a, b,
         return
     with pytest.raises(RegionError) as error:
         propose(scene, options)
-    named = re.search(r"touch at q = (\S+), (\S+), on", error.value.message)
+    named = re.search(r"touch at q = \((\S+) m, (\S+) rad\), on", error.value.message)
     s = scene.to_s(np.array([[float(x) for x in named.groups()]]))
     assert abs(clearance(scene, s)[0]) < 1e-6, "the first contact is named"
     direction = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
@@ -125,7 +125,8 @@ def test_a_contact_in_the_middle_of_points_that_see_one_another_is_refused(metho
     with pytest.raises(RegionError) as error:
         propose(scene, SeedOptions.from_document(seed))
     assert (error.value.code, error.value.field) == ("contain_blocked", "seed.contain")
-    named = re.fullmatch(r"(\S+) and (\S+) touch at q = (.+), between the configurations that the region has to hold", error.value.message)
+    said = r"(\S+) and (\S+) touch at q = \((.+)\) rad, between the configurations that the region has to hold"
+    named = re.fullmatch(said, error.value.message)
     q = np.array([float(x) for x in named[3].split(",")])
     distance, pair = drake.least(q)
     assert distance <= 1e-9

@@ -58,8 +58,8 @@ def uniform(polytope, count=20_000):
         ([0.0, 0.0, 0.0], "seed_wrong_length", "3 numbers"),
         ([0.0, math.nan], "number_too_large", "nan"),
         ([math.inf, 0.0], "number_too_large", "inf"),
-        ([0.0, 2.6], "seed_outside_limits", "crane/turn is at 2.6"),
-        ([-2.0 - 1e-6, 0.0], "seed_outside_limits", "crane/slide is at -2.000001, not between"),
+        ([0.0, 2.6], "seed_outside_limits", "crane/turn is at 2.6 rad"),
+        ([-2.0 - 1e-6, 0.0], "seed_outside_limits", "crane/slide is at -2.000001 m, not between its limits -2 and 2 m"),
         ([1.5, math.pi / 2], "seed_in_collision", "crane/arm/hook and world/ahead overlap by 0.2 m"),
     ],
 )
@@ -93,8 +93,8 @@ def test_a_seed_in_collision_gets_a_free_one_near_by(q, padding):
         return
     with pytest.raises(RegionError) as error:
         check_seed(scene, q)
-    said = re.search(r"q = ([-\d., ]+); it moves crane/(slide|turn) most, by", error.value.hint)
-    found = np.array([float(x) for x in said[1].split(",")])
+    said = re.search(r"q = \(([-\d.]+) m, ([-\d.]+) rad\); it moves crane/(slide|turn) most, by", error.value.hint)
+    found = np.array([float(said[1]), float(said[2])])
     gap = clearance(scene, scene.to_s(found[None]))[0]
     assert 0 < gap < 0.05
     check_seed(scene, found)

@@ -191,7 +191,7 @@ def test_what_is_too_long_to_check_is_refused_before_it_is_checked(monkeypatch):
 def test_the_statement_names_the_motion_and_what_is_not_covered():
     scene, proof = motion()
     lines = verify_motion(proof).lines()
-    assert lines[2] == "  from q = -0.9, -0.4"
+    assert lines[2] == "  from q = (-0.9, -0.4) rad"
     assert any("'arm/link1' and 'arm/link2'" in line and "not covered" in line for line in lines)
     assert len(json.dumps(lines)) < 2000
     curve = search(scene, raised(proof.motion, 3)).proof
