@@ -635,6 +635,9 @@ class QVolume:
     """Such as ``rad^7``."""
     box_side: float | None
     """Degrees: a box with this side in every joint has this volume; None where a joint slides."""
+    least_width: float | None = None
+    """Degrees: in some direction of joint space, no straight motion inside of the region is longer. None where a joint slides, and for a
+    region that an earlier version stored."""
 
     def __float__(self) -> float:
         return self.value

@@ -268,9 +268,12 @@ def region_ls(args: Namespace) -> int:
 
 
 def _size(region: dict[str, Any]) -> str:
-    """Returns the size of a region in a list: its average width in degrees, or its q-volume where joints slide."""
+    """Returns the size of a region in a list: its average and its least width in degrees, or its q-volume where joints slide."""
     size = region["q_volume"]
-    return "-" if size is None else f"width {size['box_side']:.3g} deg" if size["box_side"] else f"{size['value']:.3g} {size['unit']}"
+    if size is None or not size["box_side"]:
+        return "-" if size is None else f"{size['value']:.3g} {size['unit']}"
+    least = f", least {size['least_width']:.3g} deg" if size.get("least_width") else ""
+    return f"average width {size['box_side']:.3g} deg{least}"
 
 
 def region_show(args: Namespace) -> int:

@@ -142,7 +142,8 @@ def q_volume(document: dict[str, Any] | None) -> str:
     """Returns a region's volume in joint positions as a text for people. Regions that an earlier checkout stored do not say it."""
     if document is None:
         return "-"
-    side = f", average width {document['box_side']:.3g} deg" if document["box_side"] else ""
+    least = f", {document['least_width']:.3g} deg or less where it is thinnest" if document.get("least_width") else ""
+    side = f", average width {document['box_side']:.3g} deg{least}" if document["box_side"] else ""
     return f"{document['value']:.3g} +- {document['stderr']:.1g} {document['unit']}{side}"
 
 

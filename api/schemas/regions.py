@@ -31,6 +31,11 @@ class QVolume(BaseModel):
     stderr: float = Field(description="Standard error of `value`, which is found by sampling.")
     unit: str = Field(description="`rad^k` for k joints that turn, `m^k` for k joints that slide, or both, as in `rad^2 m`.")
     box_side: float | None = Field(description="Degrees: a box with this side in every joint has this volume. Null where a joint slides.")
+    least_width: float | None = Field(
+        None,
+        description="Degrees: in some direction of joint space, no straight motion inside of the region is longer. A region may be thin "
+        "there and have a large `box_side`. Null where a joint slides, and for a region that an earlier version stored.",
+    )
 
 
 class RegionSummary(BaseModel):

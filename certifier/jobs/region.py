@@ -16,6 +16,7 @@ from certifier.model import SCHEMA_VERSION, Array, Polytope, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume, volume_in_q
 from certifier.polytopes.polytope import bounds, chebyshev_center, support, without_redundant
+from certifier.polytopes.width import least_width_in_q
 from certifier.proof.region import Implied, RegionProof, read_part
 from certifier.proof.separation import Separation, digest
 from certifier.verify import uncovered
@@ -101,7 +102,7 @@ def certified_region(
         "interior_point": interior.tolist(),
         "inscribed_ellipsoid": {"center": ellipsoid.center.tolist(), "shape": ellipsoid.shape.tolist()},
         "joint_ranges": _joint_ranges(scene, polytope, candidate.seed),
-        "q_volume": _q_volume(scene, volume_in_q(polytope, scene, in_s, seed=0)),
+        "q_volume": _q_volume(scene, polytope, volume_in_q(polytope, scene, in_s, seed=0)),
         "volume": {"ellipsoid": ellipsoid.volume, "polytope": in_s[0], "polytope_stderr": in_s[1]},
         "share": None if proposal is None else proposal.share(polytope),
         "seed": None if candidate.seed is None else scene.to_q(candidate.seed).tolist(),
@@ -133,17 +134,19 @@ def certified_region(
     return Region(manifest, data, statement)
 
 
-def _q_volume(scene: Scene, measured: tuple[float, float]) -> dict[str, Any]:
+def _q_volume(scene: Scene, polytope: Polytope, measured: tuple[float, float]) -> dict[str, Any]:
     """Returns a volume in joint positions as the manifest says it: ``value`` in ``unit``, and ``stderr``.
 
-    ``box_side`` says it in degrees: a box with sides of that length in every joint has this volume. It is None for arms with joints that
-    slide, whose sides are no angles.
+    ``box_side`` says it in degrees: a box with sides of that length in every joint has this volume. ``least_width`` says in degrees how
+    thin the polytope is: in some direction, no straight motion within it is longer. They are None for arms with joints that slide, where
+    lengths in joint space are no angles.
     """
     value, error = measured
-    each = [joint.unit for joint in scene.moving]
+    each = scene.units
     units = [f"{unit}^{each.count(unit)}" if each.count(unit) > 1 else unit for unit in ("rad", "m") if unit in each]
-    side = float(np.rad2deg(value ** (1 / scene.n))) if "m" not in each else None
-    return {"value": value, "stderr": error, "unit": " ".join(units), "box_side": side}
+    widths = None if "m" in each else np.rad2deg([value ** (1 / scene.n), least_width_in_q(polytope, scene)])
+    side, least = (None, None) if widths is None else map(float, widths)
+    return {"value": value, "stderr": error, "unit": " ".join(units), "box_side": side, "least_width": least}
 
 
 def _joint_ranges(scene: Scene, polytope: Polytope, seed: Array | None) -> dict[str, dict[str, Any]]:

@@ -41,6 +41,16 @@ def _bounds(polytope: Polytope, inside: Array) -> tuple[Array, Array]:
     return -values[n:], values[:n]
 
 
+def faces_to_opposite(polytope: Polytope) -> Array:
+    """Returns for each row c's <= d how far c's goes on P, (m,): from its least value to d, which is its largest where the row is a face.
+
+    Raises:
+        RegionError: as :func:`chebyshev_center`.
+    """
+    points, _ = _maximise(polytope, -polytope.C, chebyshev_center(polytope)[0])
+    return polytope.d - np.einsum("ki,ki->k", polytope.C, points)
+
+
 def bound_multipliers(polytope: Polytope, inside: Array | None = None) -> tuple[Array, Array, Array, Array]:
     """Returns a box around P with the multipliers that prove it in exact arithmetic.
 

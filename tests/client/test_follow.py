@@ -34,7 +34,7 @@ def pair(index: int, state: str) -> dict[str, Any]:
     return {"index": index, "state": state, "stage": "sos", "margin": None, "seconds": 0.25}
 
 
-SIZE = {"value": 0.25, "stderr": 0.003, "unit": "rad^2", "box_side": 28.6}
+SIZE = {"value": 0.25, "stderr": 0.003, "unit": "rad^2", "box_side": 28.6, "least_width": 0.456}
 SHARE = {"value": 0.634, "stderr": 0.0052, "collision_free": 0.9, "samples": 10000}
 EVENTS: list[tuple[str, dict[str, Any]]] = [
     ("job", {"state": "running"}),
@@ -64,7 +64,8 @@ def test_the_course_of_a_job_in_a_few_lines() -> None:
         "seeding: done after 4.80 s",
         "iteration 0 (contract): failed, 2 of 2 pairs settled; a - c: not certifiable",
         "iteration 1 (contract): certified, 1 of 1 pairs settled",
-        "certified region r of iteration 1: 63.4 +- 0.5 % of the proposal, 0.25 +- 0.003 rad^2, average width 28.6 deg",
+        "certified region r of iteration 1: 63.4 +- 0.5 % of the proposal, 0.25 +- 0.003 rad^2, "
+        "average width 28.6 deg, 0.456 deg or less where it is thinnest",
     ]
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
@@ -26,6 +27,7 @@ from db.pairs import NewPair
 from db.session import Database
 from db.states import ACCEPT, IterationState, JobState, PairState, StepState, WorkerState
 from db.workers import Made, WorkerKind
+from tests.api.conftest import certified_polytope, store_region
 from tests.api.test_planning import store_map
 from tests.db.builders import add_iteration
 from tests.db.builders import certified as certified_pair
@@ -153,6 +155,30 @@ def test_a_job_whose_joints_slide_has_no_width_in_degrees(client: TestClient, re
     facts = text.partition('<dl class="facts">')[2].partition("</dl>")[0]
     assert "<dt>Volume in joint positions</dt>" in facts
     assert "Average width" not in facts
+
+
+def test_a_region_that_is_thin_in_one_direction_has_its_least_width_beside_the_average(
+    client: TestClient, database: Database, planar: Scene, planar_region: str
+) -> None:
+    """Each joint moves by 20 degrees within the region, and almost only together with the other one."""
+    slab = planar.polytope([[1.0, -1.0], [-1.0, 1.0], [1.0, 0.0], [-1.0, 0.0]], [-0.098, 0.102, -0.1, 0.3])
+    region = store_region(database, certified_polytope(planar, slab, np.array([-0.2, -0.1])))
+    found = client.get(f"/v1/regions/{region}").json()
+    average, least = (found["q_volume"][name] for name in ("box_side", "least_width"))
+    assert least < 0.5 < 2.0 < average
+    shown = f"<data[^>]*>{least:.3g}°</data> or less"
+    comparing = f"/compare/jobs?a={found['job']}&b={client.get(f'/v1/regions/{planar_region}').json()['job']}"
+    for address in (f"/regions/{region}", f"/jobs/{found['job']}", "/regions", f"/compare?a={region}&b={planar_region}", comparing):
+        text = client.get(address).text
+        assert re.search(rf"least: (<[^>]*>)*{least:.3g}°" if address.startswith(("/regions/", "/jobs/")) else "Least width", text), address
+        assert re.search(shown, text), address
+        assert f"{average:.3g}°</data>" in text, address
+    with database.write() as session:
+        row = regions.get(session, region)
+        row.summary = {**row.summary, "q_volume": {name: value for name, value in found["q_volume"].items() if name != "least_width"}}
+    text = client.get(f"/regions/{region}").text
+    assert "Average width" in text
+    assert "least:" not in text, "an earlier version stored the region"
 
 
 def test_where_nothing_is_proved_no_numbers_are_said(client: TestClient, database: Database) -> None:

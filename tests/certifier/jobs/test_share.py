@@ -128,6 +128,11 @@ def test_a_grown_regions_manifest_tells_the_share_the_proposal_and_the_ranges(ki
 
     unit, scale = ("deg", np.rad2deg(1.0)) if kind is JointKind.REVOLUTE else ("m", 1.0)
     assert list(manifest["joint_ranges"]) == ["arm/joint1", "arm/joint2"]
+    if kind is JointKind.REVOLUTE:
+        narrowest = min(known["upper"] - known["lower"] for known in manifest["joint_ranges"].values())
+        assert 0 < manifest["q_volume"]["least_width"] <= narrowest + 1e-9
+    else:
+        assert manifest["q_volume"]["least_width"] is None
     for i, known in enumerate(manifest["joint_ranges"].values()):
         ends = [sign * linprog(sign * np.eye(2)[i], region.C, region.d, bounds=(None, None)).fun for sign in (1, -1)]
         in_q = [scale * scene.to_q(np.full(2, end))[i] for end in ends]
