@@ -223,7 +223,11 @@ def through(regions: list[str]) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("start", "goal", "words"),
     [
-        ((-0.2, -0.1), (-0.5, -0.5), "do not overlap"),
+        (
+            (-0.2, -0.1),
+            (-0.5, -0.5),
+            "No region that is connected with the start overlaps one that is connected with the goal (2 regions and 1).",
+        ),
         ((0.5, 0.5), (-0.2, -0.1), "No region contains the start"),
         ((-0.2, -0.1), (0.5, 0.5), "No region contains the goal"),
     ],
@@ -514,7 +518,7 @@ def test_a_path_that_begins_in_contact_is_nowhere_proved(page: Any, url: str, pl
         ("path.csv", "joint2,joint1\n0,0\n0.1,0.2\n", "their names joint2, joint1 are not looked up"),
         ("path.csv", "shoulder,slide\n0,0\n0.1,0.2\n", "Columns are in the scene's order of joints"),
         ("path.csv", "0,0\n0,x\n", 'In waypoint 1, "x" is no number'),
-        ("path.csv", "0,0\n0\n", "Waypoint 1 has 1 numbers, and the first row has 2"),
+        ("path.csv", "0,0\n0\n", "Waypoint 1 has 1 number, and the first row has 2"),
     ],
 )
 def test_a_file_without_a_path_is_refused(page: Any, url: str, planar: Scene, name: str, text: str, words: str) -> None:

@@ -187,6 +187,11 @@ def joints(page: Any) -> list[float]:
     return [float(field.input_value()) for field in page.get_by_role("spinbutton", name=re.compile("as a number")).all()]
 
 
+def end(page: Any, label: str) -> list[float]:
+    """The start or the goal of a motion to plan, in degrees."""
+    return [float(text) for text in page.get_by_label(label, exact=True).input_value().split(",")]
+
+
 def test_a_robot_that_collides_at_its_centre_begins_beside_it(
     page: Any, url: str, client: TestClient, tmp_path: Path, barriers: Any
 ) -> None:
@@ -223,6 +228,11 @@ def test_the_page_of_a_scene_begins_where_the_robot_is_free(page: Any, url: str,
     page.get_by_text("The robot began at a free configuration near it.").wait_for()
     page.get_by_text("No collision (computed, not proved)").wait_for()
     assert barriers(page) == []
+    # So does a motion.
+    page.get_by_text("From and To began at a free configuration near it.").wait_for()
+    assert end(page, "From") == end(page, "To") == joints(page) != [0.0, 0.0]
+    page.get_by_role("button", name="Plan a motion").click()
+    page.locator(".found").wait_for()
     graph = client.get("/v1/planning/graph?scene=arm").json() | {"nodes": [{"region": "0123456789", "component": 0}], "components": 1}
     page.route("**/v1/planning/graph*", lambda route: route.fulfill(json=graph))
     page.route(
@@ -230,12 +240,16 @@ def test_the_page_of_a_scene_begins_where_the_robot_is_free(page: Any, url: str,
     )
     page.goto(f"{url}/scenes/arm")
     page.get_by_text("The robot began at the centre of region 01234567.").wait_for()
-    assert np.deg2rad(joints(page)) == pytest.approx([1.0, 0.5], abs=1e-3)
+    page.get_by_text("From and To began at the centre of region 01234567.").wait_for()
+    for found in (joints(page), end(page, "From"), end(page, "To")):
+        assert np.deg2rad(found) == pytest.approx([1.0, 0.5], abs=1e-3)
     # Whoever asks for q* gets it.
-    page.goto(f"{url}/scenes/arm?q=0,0")
+    page.goto(f"{url}/scenes/arm?q=0,0&from=0,0")
     page.get_by_text("Not free: arm/base/").wait_for()
-    page.wait_for_timeout(1000)
-    assert joints(page) == [0.0, 0.0]
+    page.get_by_text(re.compile("At q.*, arm/base/.* To began at the centre of region 01234567.")).wait_for()
+    assert np.deg2rad(end(page, "To")) == pytest.approx([1.0, 0.5], abs=1e-3)
+    assert joints(page) == end(page, "From") == [0.0, 0.0]
+    assert page.get_by_text("The robot began").count() == page.get_by_text("From and To began").count() == 0
 
 
 def test_a_robot_that_is_moved_while_a_free_configuration_is_looked_for_stays_where_it_is(page: Any, url: str, tmp_path: Path) -> None:

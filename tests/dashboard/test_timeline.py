@@ -44,6 +44,21 @@ def test_work_is_drawn_over_time_and_told_in_a_table(page: Any, url: str, databa
     page.wait_for_url("**#pair=0&iteration=0")
 
 
+def test_processes_are_counted_in_words(page: Any, url: str, client: TestClient, database: Database, scene: Scene) -> None:
+    job_id = new_job(database, scene)
+    begin(database, scene, job_id, cells=64)
+    settle(database, job_id, too_close(scene, 64), batch=0)
+    told, answer = client.get(f"/v1/jobs/{job_id}/timeline").json(), {}
+    page.route("**/timeline*", lambda route: route.fulfill(json=answer))
+    one, many = "1 more process, which worked less, is left out.", "3 more processes, which worked less, are left out."
+    for processes, others, said in ((1, 1, one), (2, 3, many)):
+        answer.update(told | {"processes": told["processes"] * processes, "others": others})
+        page.goto(f"{url}/jobs/{job_id}")
+        page.get_by_role("region", name="Work over time", exact=True).scroll_into_view_if_needed()
+        page.get_by_text(said).wait_for()
+        page.get_by_role("img", name="What 1 process did" if processes == 1 else "What 2 processes did").wait_for()
+
+
 @pytest.mark.usefixtures("worker")
 def test_the_page_of_a_map_says_what_is_proved_of_each_path(page: Any, url: str, client: TestClient, planar: Scene) -> None:
     """Its shares are estimates, and look so; a configuration that it proves looks proved."""

@@ -2,7 +2,7 @@
 import { post } from "./api";
 import type { ContactsResponse, PlanResponse, SceneModel } from "./schema";
 
-/** The line away from the contact is looked at in so many steps, as far as this part of the joints' half ranges. */
+/** How many configurations on the line away from the contact are looked at, and how far it goes, as a part of the joints' half ranges. */
 const STEPS = 30,
   REACH = 0.3;
 

@@ -5,6 +5,7 @@ import { onScheme } from "./colours";
 import { draw, leafAt, rectangleOf, type Rectangle } from "./treemap";
 import { Tree } from "./tree";
 import { shown } from "./units";
+import { plural } from "./words";
 
 const IN_TABLE = 40;
 const ABOUT = "The table has those that are open, and the largest. Arrow keys go from cell to cell, plus and minus zoom.";
@@ -197,7 +198,7 @@ function Treemap({
         tabIndex={0}
         role="img"
         onKeyDown={onKeyDown}
-        aria-label={`Treemap of ${cells} cells. ${ABOUT}`}
+        aria-label={`Treemap of ${plural(cells, "cell")}. ${ABOUT}`}
         onClick={(event) => onCell(leafAt(tree, root, view, event.offsetX, event.offsetY))}
         onDblClick={onIn}
       />
@@ -231,7 +232,7 @@ function Cell({ tree, cell, joints }: { tree: Tree; cell: number; joints: string
             Its plane separates <strong>{volumes[0]}</strong> from <strong>{volumes[1]}</strong>.
           </>
         )}
-        {folded && `Below it are ${folded.plane} cells with a plane, ${folded.empty} that miss the polytope and ${folded.open} open ones.`}
+        {folded && `Cells below it: ${folded.plane} with a plane, ${folded.empty} outside of the polytope, ${folded.open} open.`}
       </p>
       <div class="scroll" tabIndex={0} role="region" aria-label="Bounds of the cell">
         <table>

@@ -8,6 +8,7 @@ import { shortNames } from "./kinematics";
 import { toQ, toS, type Space } from "./polytope";
 import type { Partition, SliceAxis, SliceResponse } from "./schema";
 import { RADIANS, SHOWN, shown } from "./units";
+import { plural } from "./words";
 
 interface Props {
   scene: string;
@@ -192,7 +193,7 @@ function rounded(share: number): string {
 function summary({ rows, regions }: SliceResponse): string {
   const signs = rows.join("");
   const percent = (sign: string): string => rounded((signs.split(sign).length - 1) / signs.length);
-  const many = regions.length === 1 ? "1 region is" : `${regions.length} regions are`;
+  const many = `${plural(regions.length, "region")} ${regions.length === 1 ? "is" : "are"}`;
   return `${percent("o")} of this slice is in certified regions, ${percent("#")} in collision, by samples; ${many} in it.`;
 }
 

@@ -5,7 +5,7 @@ export type Unit = "rad" | "m";
 const KEY = "angles";
 export const RADIANS = (new URLSearchParams(location.search).get(KEY) ?? localStorage.getItem(KEY)) === "rad";
 
-/** How a unit is shown: so many of it are one shown, after these digits, with this sign, in this word. */
+/** How a unit is shown: `scale` radians or metres are one of what is shown, with this number of digits, this sign, and this word. */
 export const SHOWN = {
   rad: RADIANS ? { scale: 1, digits: 4, sign: " rad", word: "radians" } : { scale: Math.PI / 180, digits: 1, sign: "°", word: "degrees" },
   m: { scale: 1, digits: 3, sign: " m", word: "metres" },
@@ -13,6 +13,11 @@ export const SHOWN = {
 
 export function shown(value: number, unit: Unit): string {
   return `${bare(value, unit)}${SHOWN[unit].sign}`;
+}
+
+/** A configuration as people read it: "12.3°, 0.250 m". */
+export function inText(q: number[], units: Unit[]): string {
+  return q.map((value, i) => shown(value, units[i]!)).join(", ");
 }
 
 /** A configuration as people type it: numbers without their units. */

@@ -1,4 +1,5 @@
 // Reads a path from a file, as `ciris certify-path --path` does: JSON, or CSV with a row for each waypoint. It takes waypoints q only.
+import { plural } from "./words";
 
 export interface Path {
   /** (k, n), radians or metres. */
@@ -51,7 +52,7 @@ function ofCsv(text: string): Path | string {
   for (const [i, row] of rows.entries()) {
     const wrong = row.find((cell) => !isNumber(cell));
     if (wrong !== undefined) return `In waypoint ${i}, "${wrong}" is no number. Waypoints count from 0.`;
-    if (row.length !== columns) return `Waypoint ${i} has ${row.length} numbers, and the first row has ${columns}. Waypoints count from 0.`;
+    if (row.length !== columns) return `Waypoint ${i} has ${plural(row.length, "number")}, and the first row has ${columns}. Waypoints count from 0.`;
   }
   const numbers = rows.map((row) => row.map(Number));
   return { q: numbers.map((row) => row.filter((_, i) => i !== time)), t: time < 0 ? null : numbers.map((row) => row[time]!) };

@@ -2,7 +2,8 @@
 import { useState } from "preact/hooks";
 import { inAddress, useAddress } from "../common/address";
 import type { Event } from "../common/schema";
-import { duration, plural } from "./outcomes";
+import { plural } from "../common/words";
+import { duration } from "./outcomes";
 import { stageOf, stepOf } from "./steps";
 import type { JobStore } from "./store";
 

@@ -4,8 +4,9 @@ import { Component } from "preact";
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
 import type { IterationStates, PairInfo } from "../common/schema";
 import { inAddress, useAddress } from "../common/address";
+import { plural } from "../common/words";
 import { address, go } from "./route";
-import { CERTIFIED, OUTCOMES, atLeast, badness, duration, facts, plural } from "./outcomes";
+import { CERTIFIED, OUTCOMES, atLeast, badness, duration, facts } from "./outcomes";
 import { stageOf } from "./steps";
 import type { JobStore } from "./store";
 
@@ -15,7 +16,7 @@ const SPARE = 6;
 const NARROW = 560;
 const ROW = { narrow: 44, wide: 30 };
 const COLUMN = { least: 36, most: 72 };
-/** Where names have so much room, the newest iteration's time and proved distance stand beside them. */
+/** Where names have this much room, the newest iteration's time and proved distance stand beside them. */
 const ROOMY = 620;
 const NAME = { narrow: 190, least: 260, most: 470 };
 
@@ -264,7 +265,7 @@ function Grid({ store, version, rows, memory }: { store: JobStore; version: numb
               class="cell"
               key={one.index}
               aria-colindex={from + i + 2}
-              title={`${stageOf(one.label)}, ${one.faces} faces, ${one.state}`}
+              title={`${stageOf(one.label)}, ${plural(one.faces, "face")}, ${one.state}`}
               style={{ left: `${named + (from + i) * wide}px`, width: `${wide}px` }}
             >
               <span class="sr">iteration </span>

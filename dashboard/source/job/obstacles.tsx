@@ -1,9 +1,9 @@
 // What limits the region, in words, and the configuration in contact in 3D.
 import { useState } from "preact/hooks";
 import type { Obstacle } from "../common/schema";
-import { shown, type Unit } from "../common/units";
+import { inText, type Unit } from "../common/units";
+import { plural } from "../common/words";
 import { Contact } from "./contact";
-import { plural } from "./outcomes";
 import { address } from "./route";
 import type { Drawable } from "./store";
 
@@ -20,7 +20,7 @@ interface Words {
 export function Said({ about: { text, at, q }, scene, units }: Words) {
   if (!at || !q) return <>{text}</>;
   const [before, after] = text.split(at);
-  const named = `q = (${q.map((value, i) => shown(value, units[i]!)).join(", ")})`;
+  const named = `q = (${inText(q, units)})`;
   if (!scene) return <>{before}{named}{after}</>;
   return (
     <>

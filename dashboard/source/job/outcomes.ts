@@ -1,6 +1,7 @@
 // What becomes of a pair: the letter of the service, and how people see it. Every outcome has a glyph, so that nobody needs colours.
 import type { IterationStates, PairCell } from "../common/schema";
-import { shown, type Unit } from "../common/units";
+import { inText, type Unit } from "../common/units";
+import { plural } from "../common/words";
 
 export interface Outcome {
   /** The class that ciris.css colours. */
@@ -32,10 +33,6 @@ export function badness(letter: string): number {
   return ORDER.indexOf(letter);
 }
 
-export function plural(count: number, one: string): string {
-  return `${count.toLocaleString("en")} ${one}${count === 1 ? "" : "s"}`;
-}
-
 export function duration(seconds: number): string {
   if (seconds === 0) return "0 s";
   if (seconds < 0.1) return `${(1000 * seconds).toFixed(1)} ms`;
@@ -65,8 +62,7 @@ export function facts(letter: string, iteration: IterationStates, cell: PairCell
   // Of parts that have not ended, nothing is counted.
   if (cell.open_cells) found.push(`${plural(cell.open_cells, "open cell")}${cell.parts > 1 && "wos".includes(letter) ? " in those that have ended" : ""}`);
   if (cell.worker && letter === "w") found.push(`on ${cell.worker}`);
-  if (cell.witness_q)
-    found.push(`${letter === "r" ? "in collision" : "nearest"} at q = ${cell.witness_q.map((value, i) => shown(value, units[i]!)).join(", ")}`);
+  if (cell.witness_q) found.push(`${letter === "r" ? "in collision" : "nearest"} at q = ${inText(cell.witness_q, units)}`);
   if (cell.detail) found.push(cell.detail);
   return found;
 }

@@ -4,7 +4,8 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { inAddress, useAddress } from "../common/address";
 import { get, said } from "../common/api";
 import type { Bar, Timeline as Told } from "../common/schema";
-import { duration, plural } from "./outcomes";
+import { plural } from "../common/words";
+import { duration } from "./outcomes";
 import { go } from "./route";
 import type { JobStore } from "./store";
 import { stepOf } from "./steps";
@@ -197,7 +198,7 @@ function Chart({ told, store, subject, setRange }: { told: Told; store: JobStore
           style={{ height: `${high || ROW}px` }}
           preserveAspectRatio="none"
           role="img"
-          aria-label={`What ${plural(told.processes.length, "process")} did from ${duration(told.begin)} to ${duration(told.end)}. The table below has the numbers.`}
+          aria-label={`What ${plural(told.processes.length, "process", "processes")} did from ${duration(told.begin)} to ${duration(told.end)}. The table below has the numbers.`}
           onPointerDown={(event) => setDragged({ from: at(event), to: at(event) })}
           onPointerMove={(event) => dragged && setDragged({ ...dragged, to: at(event) })}
           onPointerUp={end}
@@ -233,7 +234,7 @@ function Chart({ told, store, subject, setRange }: { told: Told; store: JobStore
       </p>
       {told.others > 0 && (
         <p class="quiet small">
-          {plural(told.others, "more process")}, which worked less, {told.others === 1 ? "is" : "are"} left out.
+          {plural(told.others, "more process", "more processes")}, which worked less, {told.others === 1 ? "is" : "are"} left out.
         </p>
       )}
       {told.rates.some(({ pieces }) => pieces > 0) && <Rates told={told} x={x} words="Pairs and parts of pairs settled" of={(rate) => rate.pieces} />}

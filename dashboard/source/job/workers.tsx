@@ -1,7 +1,7 @@
 // Who does what for the job at this moment.
 import type { HeldWork } from "../common/schema";
+import { plural } from "../common/words";
 import { tick } from "../live";
-import { plural } from "./outcomes";
 import { address } from "./route";
 import { stepOf } from "./steps";
 import type { JobStore } from "./store";

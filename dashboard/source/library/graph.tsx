@@ -2,6 +2,7 @@
 import { useMemo } from "preact/hooks";
 import { LINKS } from "../common/colours";
 import type { GraphResponse } from "../common/schema";
+import { plural } from "../common/words";
 import { layout } from "./layout";
 
 interface Props {
@@ -34,7 +35,7 @@ export function Graph({ graph, holding, way, chosen, onChoose }: Props) {
   const crossed = new Set(way.slice(1).flatMap((region, i) => [`${way[i]} ${region}`, `${region} ${way[i]}`]));
   const radius = Math.max(1.1, Math.min(3.2, 14 / Math.sqrt(graph.nodes.length)));
   const deepest = Math.max(...graph.edges.map(({ depth }) => depth), 1e-9);
-  const text = `${graph.nodes.length} regions, ${graph.edges.length} overlaps, ${graph.components} ${graph.components === 1 ? "component" : "components"}`;
+  const text = `${plural(graph.nodes.length, "region")}, ${plural(graph.edges.length, "overlap")}, ${plural(graph.components, "component")}`;
   return (
     <svg class="graph" viewBox={`0 0 ${SHEET} ${SHEET}`} role="group" aria-label={text}>
       {graph.edges.map(({ a, b, depth }) => {

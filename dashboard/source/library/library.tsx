@@ -1,20 +1,21 @@
 // A scene and its library of regions: the robot, which regions hold it, how they are connected, slices, and motions.
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { inAddress, readQ, unlessUsual, useAddress, within } from "../common/address";
-import { get, MAY_START, said } from "../common/api";
+import { get, MAY_START, post, said } from "../common/api";
 import { InClaim } from "../common/claim";
 import { positions } from "../common/kinematics";
 import { MomentText, touchingOf, useMoment } from "../common/moment";
 import { nearby } from "../common/nearby";
 import type { Space } from "../common/polytope";
 import { Robot } from "../common/drawn";
-import type { Approach, GraphResponse, RegionConfigurations, SceneModel } from "../common/schema";
+import type { Approach, ContactsResponse, GraphResponse, RegionConfigurations, SceneModel } from "../common/schema";
 import { Slice } from "../common/slice";
 import { Sliders } from "../common/sliders";
+import { plural } from "../common/words";
 import { coverage, type Coverage } from "./coverage";
 import { Graph } from "./graph";
 import { Player, type Shown } from "./player";
-import { Planning } from "./plan";
+import { Planning, type Free } from "./plan";
 import { Upload } from "./upload";
 
 const ASK_AGAIN_MS = 1500;
@@ -44,26 +45,27 @@ function Library({ model, known, mapped }: { model: SceneModel; known: number; m
   const stay = useRef<HTMLDivElement>(null);
   const [pair, setPair] = useState<Approach | null>(null);
   const moment = useMoment(model.scene, q);
-  /** Where the robot began instead of at q*, and why. */
-  const [begun, setBegun] = useState<string | null>(null);
+  /** Where the robot and motions begin in place of q*, where that is not free. */
+  const [free, setFree] = useState<Free | null>(null);
+  const [left, setLeft] = useState(false);
   const latest = useRef(q);
   latest.current = q;
-  const untouched = useRef(inAddress("q") === null ? q : null);
+  const untouched = useMemo(() => (inAddress("q") === null ? q : null), []);
+  const looked = useRef(false);
   useAddress({ q: unlessUsual(q, usual) });
 
-  // Nobody has asked for q*. Where it is not free, the robot begins in a region, or beside q*.
+  // Nobody has asked for q*. Where it is not free, the robot and motions begin in a region, or beside q*.
   useEffect(() => {
-    if (moment.trouble.length === 0 || untouched.current !== q || !graph) return;
-    untouched.current = null;
-    const region = graph.nodes[0]?.region;
-    const free = region ? centre(region) : nearby(model, q);
-    // Without an answer it stays, and what is wrong there is said.
-    void free.catch(() => null).then((found) => {
-      if (!found || latest.current !== q) return;
-      setQ(found);
-      setBegun(`At q*, ${moment.trouble[0]}. The robot began at ${region ? `the centre of region ${region.slice(0, 8)}` : "a free configuration near it"}.`);
+    if (!graph || looked.current) return;
+    looked.current = true;
+    // Without an answer they stay, and what is wrong there is said.
+    void insteadOf(model, usual, graph.nodes[0]?.region).catch(() => null).then((found) => {
+      setFree(found);
+      if (!found || latest.current !== untouched) return;
+      setQ(found.q);
+      setLeft(true);
     });
-  }, [moment, graph]);
+  }, [graph]);
   useEffect(() => {
     let timer: ReturnType<typeof setTimeout> | undefined;
     const ask = (): void => {
@@ -110,7 +112,7 @@ function Library({ model, known, mapped }: { model: SceneModel; known: number; m
       <div class="views">
         <div class="stay" ref={stay}>
           <Robot model={model} q={q} onDrag={setQ} touching={touching} label={`The robot of ${model.name}${pair?.q === q ? `, with ${pair.a} and ${pair.b} painted` : touching.length ? ", not free" : ""}`} />
-          {begun && <p class="quiet small">{begun}</p>}
+          {free && left && <p class="quiet small">At q*, {free.why}. The robot began at {free.where}.</p>}
           {motion && <Player motion={motion} names={names} units={model.units} onMove={setQ} />}
           <Sliders names={names} units={model.units} lower={model.q_lower} upper={model.q_upper} q={q} onChange={setQ} />
         </div>
@@ -124,7 +126,7 @@ function Library({ model, known, mapped }: { model: SceneModel; known: number; m
           ) : (
             <>
               <p class="counts">
-                <strong>{graph.nodes.length}</strong> {graph.nodes.length === 1 ? "region" : "regions"}, {graph.edges.length} {graph.edges.length === 1 ? "overlap" : "overlaps"}, <strong>{graph.components}</strong> <abbr title="Regions are in one component where overlaps lead from each to every other one">{graph.components === 1 ? "component" : "components"}</abbr>{!graph.complete && ", so far"}.{" "}
+                <strong>{graph.nodes.length}</strong> {graph.nodes.length === 1 ? "region" : "regions"}, {plural(graph.edges.length, "overlap")}, <strong>{graph.components}</strong> <abbr title="Regions are in one component where overlaps lead from each to every other one">{graph.components === 1 ? "component" : "components"}</abbr>{!graph.complete && ", so far"}.{" "}
                 {covered && <><span class="computed">They cover <strong>{(100 * covered.value).toFixed(0)} ± {Number((100 * covered.stderr).toPrecision(1))} %</strong> of the free configurations</span>, by a sample of {covered.free}.</>}
               </p>
               <Graph graph={graph} holding={holding} way={way} chosen={chosen} onChoose={choose} />
@@ -148,7 +150,7 @@ function Library({ model, known, mapped }: { model: SceneModel; known: number; m
               </details>
               {graph.gaps.length > 0 && (
                 <details>
-                  <summary>{graph.gaps.length} {graph.gaps.length === 1 ? "gap" : "gaps"} between components</summary>
+                  <summary>{plural(graph.gaps.length, "gap")} between components</summary>
                   <ul>
                     {graph.gaps.map((gap) => (
                       <li key={`${gap.a} ${gap.b}`}>{gap.distance.toPrecision(3)} in <InS /> between {gap.a.slice(0, 8)} and {gap.b.slice(0, 8)}: {gap.map ? "the map proves the straight motion across it" : <Advice scene={model.scene} q={gap.q} onLook={setQ} />}</li>
@@ -161,7 +163,7 @@ function Library({ model, known, mapped }: { model: SceneModel; known: number; m
         </section>
           <section aria-labelledby="h-plan">
             <h2 id="h-plan">Plan a motion</h2>
-            <Planning model={model} names={names} usual={usual} q={q} onMove={setQ} onShow={setMotion} />
+            <Planning model={model} names={names} usual={usual} free={free} q={q} onMove={setQ} onShow={setMotion} />
           </section>
           {MAY_START && (
             <section aria-labelledby="h-upload">
@@ -173,6 +175,14 @@ function Library({ model, known, mapped }: { model: SceneModel; known: number; m
       </div>
     </div>
   );
+}
+
+/** A free configuration in place of this one, where something is wrong at it; null where nothing is, or where none was found. */
+async function insteadOf(model: SceneModel, q: number[], region: string | undefined): Promise<Free | null> {
+  const { contacts } = await post<ContactsResponse>("/v1/planning/contacts", { scene: model.scene, q: [q] });
+  const why = contacts[0]!.trouble[0];
+  const found = why && (await (region ? centre(region) : nearby(model, q)));
+  return found ? { q: found, why, where: region ? `the centre of region ${region.slice(0, 8)}` : "a free configuration near it" } : null;
 }
 
 async function centre(region: string): Promise<number[]> {

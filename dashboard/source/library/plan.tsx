@@ -1,10 +1,11 @@
 // A motion from a start to a goal: asked for, said why there is none, or played.
-import { useMemo, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { inAddress, readQ, unlessUsual, useAddress } from "../common/address";
 import { post, said } from "../common/api";
 import { asCommand, asCurl, asPython, Copies, python, shell, type Texts } from "../common/copies";
 import { movingBodies } from "../common/kinematics";
 import type { Piece, PlanResponse, SceneModel } from "../common/schema";
+import { plural } from "../common/words";
 import type { Part, Shown } from "./player";
 import { asked, poseIn, PoseFields, typedAt, type Typed } from "./pose";
 import { Why } from "./why";
@@ -13,12 +14,21 @@ import { asText, inWords, shown, typed } from "../common/units";
 interface Props {
   model: SceneModel;
   names: string[];
-  /** Where the robot is unless the address says otherwise. */
+  /** Where a motion begins and ends unless the address says otherwise. */
   usual: number[];
+  /** The same in place of q*, where that is not free: it comes once it is known. */
+  free: Free | null;
   q: number[];
   onMove: (q: number[]) => void;
   /** Shows a motion, or takes the one that was shown away. */
   onShow: (motion: Shown | null) => void;
+}
+
+/** A free configuration, and in words why it stands in place of q*, and which one it is. */
+export interface Free {
+  q: number[];
+  why: string;
+  where: string;
 }
 
 /** An end of the motion as it is shown, and the configuration that is meant; null where the text is none. */
@@ -30,10 +40,19 @@ interface End {
 /** How far a frame may be from a straight line. */
 const LINE = { metres: 1e-3, radians: (0.5 * Math.PI) / 180 };
 
-export function Planning({ model, names, usual, q, onMove, onShow }: Props) {
+export function Planning({ model, names, usual, free, q, onMove, onShow }: Props) {
   const { units } = model;
   const here = (at: number[]): End => ({ text: asText(at, units), q: at });
   const [ends, setEnds] = useState(() => ({ start: here(readQ(inAddress("from"), units.length) ?? usual), goal: here(readQ(inAddress("to"), units.length) ?? usual) }));
+  /** The ends that nobody has chosen. They leave q* where it is not free. */
+  const unchosen = useRef({ start: inAddress("from") === null, goal: inAddress("to") === null });
+  const [left, setLeft] = useState<("start" | "goal")[]>([]);
+  useEffect(() => {
+    if (!free) return;
+    const moved = (["start", "goal"] as const).filter((end) => unchosen.current[end]);
+    setEnds((old) => ({ ...old, ...Object.fromEntries(moved.map((end) => [end, here(free.q)])) }));
+    setLeft(moved);
+  }, [free]);
   const frames = useMemo(() => movingBodies(model).reverse(), [model]);
   /** The goal where it is the pose of a frame; null where it is a configuration. */
   const [pose, setPose] = useState(() => poseIn(frames, inAddress("pose")));
@@ -42,6 +61,7 @@ export function Planning({ model, names, usual, q, onMove, onShow }: Props) {
   const [problem, setProblem] = useState<string | null>(null);
   const [asking, setAsking] = useState(false);
   const words = inWords(units);
+  const began = left.filter((end) => end === "start" || !pose).map((end) => (end === "start" ? "From" : "To"));
   useAddress({
     from: ends.start.q && unlessUsual(ends.start.q, usual),
     to: pose ? null : ends.goal.q && unlessUsual(ends.goal.q, usual),
@@ -58,7 +78,8 @@ export function Planning({ model, names, usual, q, onMove, onShow }: Props) {
   const ask = async (event: Event): Promise<void> => {
     event.preventDefault();
     const [start, goal] = [ends.start.q, ends.goal.q];
-    if (!start || !(goal || pose)) return setProblem(`Give ${units.length} numbers for ${start ? "the goal" : "the start"}, one for each joint, in ${words}.`);
+    unchosen.current = { start: false, goal: false };
+    if (!start || !(goal || pose)) return setProblem(`Give ${plural(units.length, "number")} for ${start ? "the goal" : "the start"}, one for each joint, in ${words}.`);
     setProblem(null);
     setAsking(true);
     try {
@@ -72,6 +93,7 @@ export function Planning({ model, names, usual, q, onMove, onShow }: Props) {
     setAsking(false);
   };
   const set = (end: "start" | "goal", to: End): void => {
+    unchosen.current[end] = false;
     setEnds((old) => ({ ...old, [end]: to }));
     onPlan(null);
   };
@@ -107,6 +129,7 @@ export function Planning({ model, names, usual, q, onMove, onShow }: Props) {
           </select>
         </p>
         {pose ? <PoseFields model={model} q={q} pose={pose} onChange={setGoalPose} /> : <p class="end">{field("goal")}</p>}
+        {free && began.length > 0 && <p class="quiet small">At q*, {free.why}. {began.join(" and ")} began at {free.where}.</p>}
         <p class="quiet small" id="plan-units">A configuration has one number for each joint, in {words}. Move the robot and set the start or the goal, or type.</p>
         {pose ? (
           <p><label><input type="checkbox" checked={flags.straight} onChange={(event) => flag("straight", event.currentTarget.checked)} /> On a straight line of the frame, to 1 mm and 0.5°</label></p>

@@ -1,6 +1,7 @@
 // Why there is no motion, in plain words, and what people can do about it.
 import type { BeyondLimit, Collision, PlanResponse } from "../common/schema";
-import { asText, shown } from "../common/units";
+import { inText, shown } from "../common/units";
+import { plural } from "../common/words";
 
 interface Props {
   plan: PlanResponse;
@@ -58,10 +59,10 @@ function why(plan: PlanResponse, names: string[], units: ("rad" | "m")[]): strin
     case "start_uncovered":
     case "goal_uncovered": {
       const said = `No region contains the ${reason === "start_uncovered" ? "start" : "goal"}.`;
-      return nearest ? `${said} The nearest region is ${nearest.region!.slice(0, 8)}, with ${asText(nearest.q, units)}.` : said;
+      return nearest ? `${said} The nearest region is ${nearest.region!.slice(0, 8)}, whose nearest point is ${inText(nearest.q, units)}.` : said;
     }
     case "disconnected":
-      return `The ${gap!.start_regions} regions that are connected with the start do not overlap the ${gap!.goal_regions} that are connected with the goal. ${gap!.q ? `A region that is grown at ${asText(gap!.q, units)} may join them.` : "No free configuration was found near its middle."}`;
+      return `No region that is connected with the start overlaps one that is connected with the goal (${plural(gap!.start_regions, "region")} and ${gap!.goal_regions}). ${gap!.q ? `A region that is grown at ${inText(gap!.q, units)} may join them.` : "No free configuration was found near its middle."}`;
     case "not_proved":
       return "Regions lead from the start to the goal, but no motion was found that is proved to lie in them.";
   }

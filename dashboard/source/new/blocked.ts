@@ -3,7 +3,7 @@ import { useEffect, useState } from "preact/hooks";
 import { post } from "../common/api";
 import { toQ, toS, type Space } from "../common/polytope";
 import type { ContactsResponse, SceneModel } from "../common/schema";
-import { asText } from "../common/units";
+import { inText } from "../common/units";
 
 /** The service answers about this many configurations at a time. */
 const MOST = 100;
@@ -27,7 +27,7 @@ export async function blocked(model: SceneModel, points: number[][], signal?: Ab
   const first = contacts.findIndex(({ pairs }) => pairs !== null && pairs.length > 0);
   if (first < 0) return null;
   const { q, where } = samples[first]!;
-  const at = `${contacts[first]!.trouble[0]}, at ${asText(q, model.units)}`;
+  const at = `${contacts[first]!.trouble[0]}, at ${inText(q, model.units)}`;
   if (first < ends.length) return `No region can contain ${where}: ${at} (computed).${first ? " Remove it from the list." : ""}`;
   return `One region cannot contain both ends of ${where}: ${at} (computed). It would hold all of that line. Remove one of them, or connect them with several regions.`;
 }

@@ -1,6 +1,7 @@
 // The scene to work on: one that is stored, or one that is uploaded now.
 import { useEffect, useState } from "preact/hooks";
 import { get, said, ServiceError, upload } from "../common/api";
+import { plural } from "../common/words";
 import { chosen as chosenFiles, dropped, nameOf, packed, pathsIn, saying, type Chosen } from "../common/zip";
 import type { LintReport, SceneDetail, SceneModel } from "../common/schema";
 import { seedIn } from "./seed";
@@ -122,7 +123,7 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
         <select id="new-scene" value={chosen ?? ""} onChange={(event) => onChoose(event.currentTarget.value)} disabled={offers.length === 0}>
           {offers.length === 0 && <option value="">none yet</option>}
           {offers.map(({ id, name, title, joints, pairs }) => (
-            <option value={name} key={name}>{`${title} · ${joints} joint${joints === 1 ? "" : "s"}, ${pairs} pair${pairs === 1 ? "" : "s"} · ${id.slice(0, 8)}`}</option>
+            <option value={name} key={name}>{`${title} · ${plural(joints, "joint")}, ${plural(pairs, "pair")} · ${id.slice(0, 8)}`}</option>
           ))}
         </select>
       </p>
@@ -153,7 +154,7 @@ export function ChooseScene({ scenes, chosen, model, onChoose, onUpload }: Props
         )}
         {added && (
           <p class="notice">
-            {added.name} is stored, with {added.joints} {added.joints === 1 ? "joint" : "joints"} and {added.pairs} {added.pairs === 1 ? "pair" : "pairs"}.{seeded && " The robot stands at the seed that came with it."}
+            {added.name} is stored, with {plural(added.joints, "joint")} and {plural(added.pairs, "pair")}.{seeded && " The robot stands at the seed that came with it."}
             {warnings.length > 0 && " Read this before you trust a proof about it:"}
           </p>
         )}

@@ -1,6 +1,7 @@
 // A file with a part of the request: chosen or dropped, and read in the browser.
 import { useState } from "preact/hooks";
 import { objectOf, readPath } from "../common/waypoints";
+import { plural } from "../common/words";
 import type { Fields, File as Read } from "./request";
 
 interface Props {
@@ -43,7 +44,7 @@ export function FileField({ kind, file, onFile }: Props) {
 
 function counted(fields: Fields): string {
   const [name, rows] = Object.entries(fields).find(([, value]) => Array.isArray(value) && value.length > 0) as [string, unknown[]];
-  return `${rows.length} rows of ${name}`;
+  return `${plural(rows.length, "row")} of ${name}`;
 }
 
 function motion(name: string, text: string): Fields | string {

@@ -10,6 +10,7 @@ import type { Partition, RegionConfigurations, RegionDetail, RegionPair, RegionP
 import { ofCondition } from "../common/kinematics";
 import { Slice } from "../common/slice";
 import { Sliders } from "../common/sliders";
+import { plural } from "../common/words";
 import { PlaneText, usePlane } from "./plane";
 import { SaveAsHtml } from "./save";
 
@@ -137,7 +138,7 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
             <select value={pair ?? ""} onChange={(event) => setPair(event.currentTarget.value === "" ? null : Number(event.currentTarget.value))}>
               <option value="">none</option>
               {most.map((proof) => (
-                <option value={proof.index} key={proof.index}>{`${proof.a} – ${proof.b}: ${proof.cells} cell${proof.cells === 1 ? "" : "s"}`}</option>
+                <option value={proof.index} key={proof.index}>{`${proof.a} – ${proof.b}: ${plural(proof.cells, "cell")}`}</option>
               ))}
             </select>
           </label>
