@@ -31,7 +31,7 @@ GARBAGE = 20_000, 10, 100
 """The thresholds of Python's garbage collector: how many new objects start a pass over the young objects, then how many passes
 start one over the middle and over the old objects.
 """
-SWITCH_SECONDS = 0.0005
+SWITCH_SECONDS = 0.0002
 """A thread that computes gives way to another one after this time. One request waits for the interpreter several times."""
 
 

@@ -7,6 +7,7 @@ is not needed: a model checks its own fields when it is made. Here one of a few 
 from __future__ import annotations
 
 import inspect
+import json
 from collections.abc import Callable
 from functools import partial, wraps
 from typing import Any
@@ -19,6 +20,8 @@ from api.turns import Turns
 
 READERS = 4
 """This many threads answer reading routes. Each takes one of the process' database connections while it reads."""
+LONG = 500
+"""A list of more models is written item by item."""
 _threads = Turns("read", READERS, READERS - 1)
 
 
@@ -41,10 +44,18 @@ def _returns_model(endpoint: Callable[..., Any]) -> bool:
 
 def _in_one_visit(endpoint: Callable[..., BaseModel]) -> Callable[..., Any]:
     def answer(arguments: dict[str, Any]) -> Response:
-        return Response(endpoint(**arguments).model_dump_json(), media_type="application/json")
+        return Response(_written(endpoint(**arguments)), media_type="application/json")
 
     @wraps(endpoint)
     async def visit(**arguments: Any) -> Response:
         return await _threads.run(getattr(arguments.get("db"), "project", None), partial(answer, arguments))
 
     return visit
+
+
+def _written(answer: BaseModel) -> str:
+    """Returns the JSON of an answer. It writes long lists item by item: while one call writes them, no other thread goes on."""
+    long = {name: value for name, value in answer if isinstance(value, list) and len(value) > LONG and isinstance(value[0], BaseModel)}
+    rest = answer.model_dump_json(exclude=set(long))
+    lists = [f"{json.dumps(name)}:[{','.join(item.model_dump_json() for item in items)}]" for name, items in long.items()]
+    return "{" + ",".join(filter(None, (rest[1:-1], *lists))) + "}"

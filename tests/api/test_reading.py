@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 
 from fastapi import APIRouter, FastAPI, Response
 from fastapi.testclient import TestClient
+from hypothesis import given
+from hypothesis import strategies as st
 from pydantic import BaseModel
 
-from api.reading import READERS, ReadingRoute
+from api.reading import LONG, READERS, ReadingRoute, _written
 
 
 class Answer(BaseModel):
@@ -65,3 +68,28 @@ def test_what_a_route_documents_and_how_others_answer_stays_as_it_is() -> None:
     assert not written.json()["thread"].startswith("read")
     answer = readers.app.openapi()["paths"]["/read/{seconds}"]["get"]["responses"]["200"]
     assert answer["content"]["application/json"]["schema"] == {"$ref": "#/components/schemas/Answer"}
+
+
+class Cell(BaseModel):
+    name: str
+    value: float | None = None
+
+
+class Page(BaseModel):
+    cells: list[Cell]
+
+
+class Matrix(Page):
+    numbers: list[int]
+    note: str = "\u00e9\n"
+
+
+@given(st.integers(LONG - 1, LONG + 2), st.sampled_from(["a", '"', "\u20ac"]), st.booleans())
+def test_a_long_list_is_written_as_pydantic_writes_it(length: int, name: str, noted: bool) -> None:
+    cells = [Cell(name=name, value=None if i % 3 else i / 7) for i in range(length)]
+    for answer in (
+        Matrix(cells=cells, numbers=list(range(length)), note=name * noted),
+        Page(cells=cells),
+        Page(cells=[]),
+    ):
+        assert json.loads(_written(answer)) == json.loads(answer.model_dump_json())
