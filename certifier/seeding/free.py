@@ -19,6 +19,8 @@ ROOM = (1e-3, 0.0)
 """A free configuration that is named has the first of these distances to contact, in metres, that is found. On contact, none can grow."""
 WIDTHS, NEARER = np.geomspace(1.0, 0.05, 10), 0.97
 """Ways that leave the known one by these widths are tried EACH times: is a configuration free at this part of the distance already?"""
+TOUCH = 1e-9
+"""Bodies that overlap by less than this, in metres, are said to touch."""
 STEPS = 8
 """What was found is moved back towards the seed in this many steps of bisection."""
 
@@ -63,7 +65,9 @@ def check_free(scene: Scene, q: Array, field: str) -> Nearest:
     room, found = next((one for one in searched if one[1] is not None), (0.0, None))
     condition = not_kept(scene, pair, q)
     if condition is None:
-        how = f"overlap by {-distance:.3g} m" if distance <= 0 else f"are {distance:.3g} m apart, with a padding of {padding:g} m on each"
+        how = f"are {distance:.3g} m apart, with a padding of {padding:g} m on each"
+        if distance <= 0:
+            how = f"overlap by {-distance:.3g} m" if distance < -TOUCH else "touch"
         message, hint = f"{pair.a} and {pair.b} {how}", "move the seed, or ignore the pair in the scene"
         if distance <= 0:
             message += _hollow(scene, pair)

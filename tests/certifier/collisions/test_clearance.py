@@ -26,6 +26,7 @@ from certifier.model import WORLD, Array, Geometry, Joint, JointKind, Pair, Scen
 from certifier.pair.collisions import contacts
 from certifier.polytopes.closest import closest
 from certifier.scene.contacts import overlaps, touching
+from certifier.seeding.free import check_free
 from tests.certifier.scenes import ball, box
 
 SECONDS = 20.0
@@ -133,6 +134,12 @@ def test_growing_from_where_bodies_overlap_ends_with_the_depth_and_a_free_config
     assert (error.value.code, error.value.field) == ("seed_in_collision", "seed.q")
     assert f"arm/b and world/a overlap by {-exactly:.3g} m" in error.value.message
     assert "the nearest free configuration found is q = " in error.value.hint
+
+
+def test_bodies_that_overlap_by_a_rounding_error_are_said_to_touch() -> None:
+    for depth, how in ((1e-12, "touch"), (1e-6, "overlap by 1e-06 m")):
+        with pytest.raises(RegionError, match=f"arm/b and world/a {how}"):
+            check_free(two(cube(), cube((1 - depth, 0, 0))), np.zeros(1), "seed.q")
 
 
 def test_a_hair_decides_whether_bodies_are_free() -> None:
