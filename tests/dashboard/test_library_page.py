@@ -130,7 +130,9 @@ def test_the_robot_and_its_player_stay_in_view_while_the_page_scrolls(opened: An
 
 def test_on_a_phone_the_buttons_of_the_view_are_over_the_robot(opened: Any) -> None:
     opened.set_viewport_size({"width": 390, "height": 844})
-    robot, front = opened.locator(".robot").bounding_box(), opened.get_by_role("button", name="View: front").bounding_box()
+    button = opened.get_by_role("button", name="View: front")
+    button.wait_for()  # before, another element keeps the robot's place
+    robot, front = opened.locator(".robot").bounding_box(), button.bounding_box()
     assert robot["y"] <= front["y"] <= robot["y"] + robot["height"]
 
 
