@@ -11,6 +11,7 @@ from fastapi import FastAPI
 
 from api.app import create_app
 from api.connections import BoundedProtocol, allow_files
+from api.delivery import every
 from certifier.errors import CirisError
 from db import keys, logs, traces
 from db.session import check_version
@@ -75,11 +76,13 @@ def _shared_socket() -> socket.socket:
 
 
 def _frozen_app() -> FastAPI:
-    """Makes the application, and limits how often the garbage collector runs, because it stops every request while it runs.
+    """Makes the application with all of its routes, and limits how often the garbage collector runs, because it stops every request.
 
-    The collector never looks at objects that exist when the application is made, and seldom at the later ones.
+    FastAPI makes the routes of a router when they are first looked at, for which the first requests would wait. The collector never looks
+    at objects that exist when the application is made, and seldom at the later ones.
     """
     app = create_app()
+    list(every(app.routes))
     gc.collect()
     gc.freeze()
     gc.set_threshold(*GARBAGE)
