@@ -12,6 +12,7 @@ import os
 import sys
 import threading
 import warnings
+from contextlib import suppress
 from typing import Any
 
 NURSERY_S = 60.0
@@ -43,11 +44,13 @@ def main() -> None:
     from workers.app import CONTROL, SOLVE, celery_app
     from workers.heartbeat import Heartbeat
     from workers.presence import Presence
-    from workers.processes import give_way
+    from workers.processes import NICENESS, give_way
     from workers.tasks import register
     from workers.troubles import Troubles
 
-    stop, worker = threading.Event(), os.getpid()
+    stop, worker, niceness = threading.Event(), os.getpid(), os.getpriority(os.PRIO_PROCESS, 0) + NICENESS
+    heard, told = os.pipe()
+    os.set_blocking(told, False)
 
     logs.configure(queue)
     try:
@@ -85,19 +88,28 @@ def main() -> None:
 
             nursery = prepare(PROPOSE, NURSERY_S)
             if asked.background:
-                give_way(nursery)
+                give_way(niceness, nursery)
         traces.configure(queue)
+        with suppress(BlockingIOError):  # once is enough
+            os.write(told, b"1")
 
     @worker_process_shutdown.connect(weak=False)
     def before_end(**_: Any) -> None:
         traces.end()
 
+    def begin_with_first(consumer: Any) -> None:
+        """Celery is ready before any process can take work: each loads for seconds, or for a minute on a busy machine."""
+        os.read(heard, 1)
+        presence.begin(consumer)
+
     @worker_ready.connect(weak=False)
     def begin(sender: Any, **_: Any) -> None:
         if asked.background:
-            give_way()
-        presence.begin(sender)
-        if queue == CONTROL:
+            give_way(niceness)
+        if queue == SOLVE:
+            threading.Thread(target=begin_with_first, args=(sender,), name="first process", daemon=True).start()
+        else:
+            presence.begin(sender)
             traces.configure(queue)
             from workers import checkpoints, sweeper, webhooks
 

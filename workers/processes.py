@@ -8,21 +8,22 @@ from contextlib import suppress
 from pathlib import Path
 
 NICENESS = 10
-"""A process with this niceness gets about a tenth of what another one gets of a core that both want.
+"""A process whose niceness is larger by this gets about a tenth of what another one gets of a core that both want.
 
 That is so little that the API answers at once, and enough for the process to go on.
 """
 
 
-def give_way(*children: int) -> None:
+def give_way(niceness: int, *children: int) -> None:
     """Lets every other process go first: by this process's niceness, and by that of its session, which Linux' autogroups compare.
 
     Args:
+        niceness: that of this process from now on. One that was forked may have it already.
         children: ids of processes that this one has started, which give way too.
     """
     for process in (os.getpid(), *children):
         with suppress(ProcessLookupError):
-            os.setpriority(os.PRIO_PROCESS, process, os.getpriority(os.PRIO_PROCESS, process) + NICENESS)
+            os.setpriority(os.PRIO_PROCESS, process, niceness)
     with suppress(OSError):
         Path("/proc/self/autogroup").write_text(str(NICENESS))
 

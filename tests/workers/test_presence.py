@@ -16,6 +16,7 @@ from db import machine, version, workers
 from db.leases import name_of
 from db.models import WorkerRow
 from db.session import database
+from db.settings import SPARE
 from db.states import WorkerState
 from tests.workers.options import box_around
 from tests.workers.service import Service, ended, events_of, eventually, job_of, pairs_of, submit
@@ -74,6 +75,22 @@ def test_workers_say_what_they_are_and_leave(crew: Service) -> None:
     os.kill(crew.pid("solve"), signal.SIGQUIT)
     eventually(lambda: crew.status("solve") is not None, "the worker ends")
     assert row_of(crew, "solve") is None, "it took its row with it"
+
+
+def test_a_solve_worker_runs_once_one_of_its_processes_can_take_work(crew: Service) -> None:
+    """Each loads for seconds. Nobody is to be told meanwhile that a job is next."""
+    crew.start("solve-2")
+    eventually(lambda: len(crew.children("solve-2")) == 2 + SPARE, "it forks its processes", 60)
+    loading = crew.children("solve-2")
+    for child in loading:
+        os.kill(child, signal.SIGSTOP)
+    time.sleep(LINGER_SECONDS)
+    row = row_of(crew, "solve-2")
+    for child in loading:
+        os.kill(child, signal.SIGCONT)
+    assert row is not None
+    assert row.state == WorkerState.STARTING
+    assert seen(crew, "solve-2")
 
 
 def test_a_worker_that_was_killed_is_forgotten(crew: Service) -> None:
