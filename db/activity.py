@@ -151,17 +151,17 @@ def missing(counts: dict[tuple[str, str], int], kind: WorkerKind) -> str | None:
 def _held(session: Session) -> dict[str, datetime]:
     """Returns until when the work of a job is held at the latest, for all jobs of which some is."""
     found: dict[str, datetime] = {}
-    for query in _held_work():
-        for job_id, latest in session.execute(query):
+    for model in (PairRow, StepRow):
+        for job_id, latest in session.execute(_held_of(model)):
             found[job_id] = max(latest, found.get(job_id, latest))
     return found
 
 
 @cache
-def _held_work() -> tuple[Select[str, Any], ...]:
-    kinds: tuple[type[PairRow] | type[StepRow], ...] = (PairRow, StepRow)
-    held = ((row, (row.state == leases.RUNNING, row.lease_until.is_not(None))) for row in kinds)
-    return tuple(select(row.job_id, func.max(row.lease_until)).where(*is_held).group_by(row.job_id) for row, is_held in held)
+def _held_of(model: type[PairRow] | type[StepRow]) -> Select[str, Any]:
+    """Returns the query for until when pairs, or steps, of a job are held at the latest."""
+    held = (model.state == leases.RUNNING, model.lease_until.is_not(None))
+    return select(model.job_id, func.max(model.lease_until)).where(*held).group_by(model.job_id)
 
 
 @cache
