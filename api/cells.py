@@ -73,7 +73,7 @@ def numbered(scene: Scene, index: int) -> PairInfo:
         CirisError: pair_not_found.
     """
     if not 0 <= index < len(scene.pairs):
-        message = f"there is no pair {index}: the scene has {len(scene.pairs)} pairs, numbered from 0"
+        message = f"there is no pair {index}: the numbers of the scene's pairs are less than {len(scene.pairs)}"
         raise CirisError("pair_not_found", message, field="pair", hint="/v1/scenes/{id}/pairs lists them")
     pair = scene.pairs[index]
     return PairInfo(index=index, a=pair.a, b=pair.b)

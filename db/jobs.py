@@ -109,8 +109,8 @@ def _check_quota(session: Session, project: str, key_id: str | None) -> None:
     Several requests at the same moment may each count as the last job that fits, so a limit may be exceeded a little.
     """
     most_of_key, most_of_project = settings().max_jobs_per_key, settings().max_jobs_per_project
-    counted = (JobRow.project == project, JobRow.state.in_(unfinished(JOB)), JobRow.parent_id.is_(None))
-    counts = dict(session.execute(select(JobRow.key_id, func.count()).where(*counted).group_by(JobRow.key_id)).all())
+    of_project = (JobRow.project == project, JobRow.state.in_(unfinished(JOB)), JobRow.parent_id.is_(None))
+    counts = dict(session.execute(select(JobRow.key_id, func.count()).where(*of_project).group_by(JobRow.key_id)).all())
     if counts[key_id] > most_of_key:
         raise _too_many("an API key", most_of_key, "CIRIS_MAX_JOBS_PER_KEY")
     if sum(counts.values()) > most_of_project:
@@ -118,7 +118,7 @@ def _check_quota(session: Session, project: str, key_id: str | None) -> None:
 
 
 def _too_many(who: str, limit: int, setting: str) -> CirisError:
-    message = f"{limit} jobs that have not ended are the most that {who} may have at a time"
+    message = f"{who} has as many unfinished jobs as it may have at a time: {limit}"
     return CirisError("quota_exceeded", message, hint=f"wait for some to end, cancel some, or have {setting} raised")
 
 

@@ -76,7 +76,7 @@ def _after_look(state: CoverState, seen: Scouted) -> Transition:
         return _close(state, f"the last {IDLE} regions changed nothing")
     left = state.options.regions - state.begun
     if left <= 0 and not state.growing:
-        return _finish(state, seen, f"{state.begun} regions were grown, and no more are asked for")
+        return _finish(state, seen, f"as many regions were grown as are asked for: {state.begun}")
     free = min(state.options.at_once - len(state.growing), left)
     chosen = _worth_it(state, (*_given(state, seen), *seen.proposals))[: max(free, 0)]
     begun, tried = dict(enumerate(chosen, state.begun)), (*state.tried, *(task.request for task in chosen))
