@@ -125,7 +125,7 @@ def _beside(
     """Returns the jobs, in the order of work, that may have a process beside the solvers: those of projects with the fewest solvers."""
     waiting = session.execute(_placed(), {"now": utcnow(), "places": 1, "most": MOST_KEYS}).all()
     with_work = {one.project for one in waiting} | {project for project, solvers in of_project.items() if solvers > 0}
-    least = min(of_project[project] for project in with_work)
+    least = min((of_project[project] for project in with_work), default=0.0)  # another process may have taken it all meanwhile
     return [one for one in _sorted(session, found, of_project, of_key) if of_project[one.project] <= least]
 
 
@@ -190,10 +190,10 @@ def to_give_up(session: Session) -> leases.Lost | None:
     """Returns the lease of a step that its holder is to give up, so that others get a solver within seconds; None when there is none.
 
     That is when all solvers do steps, whose end nobody knows, and a project for which none works has work. The project that holds most
-    steps, if it holds several, gives up the one that was asked for last, and the accepting of a region after all others, because it often
-    has a process beside the solvers. No step is given up twice. Work of other kinds ends within seconds, or gives way by itself.
+    steps, if it holds several, gives up the one that was asked for last. No step is given up twice. Work of other kinds ends within
+    seconds, or gives way by itself; the accepting of a region may also have the process beside the solvers.
     """
-    long = (StepRow.state == StepState.RUNNING, StepRow.kind.not_in((LEAD, PIECE)))
+    long = (StepRow.state == StepState.RUNNING, StepRow.kind.not_in((LEAD, PIECE, ACCEPT)))
     of_project = Counter(session.scalars(select(JobRow.project).join(StepRow, StepRow.job_id == JobRow.id).where(*long)))
     if max(of_project.values(), default=0) < 2 or of_project.total() < workers.solvers(session):
         return None
@@ -202,7 +202,7 @@ def to_give_up(session: Session) -> leases.Lost | None:
         return None
     ((project, _),) = of_project.most_common(1)
     of_it = select(StepRow).join(JobRow, JobRow.id == StepRow.job_id).where(*long, JobRow.project == project, StepRow.attempts == 1)
-    step = session.scalar(of_it.order_by(StepRow.kind == ACCEPT, StepRow.id.desc()).limit(1))
+    step = session.scalar(of_it.order_by(StepRow.id.desc()).limit(1))
     if step is None:
         return None
     return leases.Lost(step.job_id, step.lease_token or "", step.worker or "", "another project had no solver", alone=False)

@@ -80,6 +80,7 @@ class Growing(Kind):
             afterwards.append(send_work)
         if decision.candidate is not None:
             steps.add(session, job, ACCEPT, stored.document(decision.candidate))
+            afterwards.append(send_work)
         return isinstance(action, Finish) or (isinstance(action, Certify) and not action.pairs)
 
     def late(self, session: Session, job: JobRow) -> Finish:

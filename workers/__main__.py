@@ -83,15 +83,17 @@ def main() -> None:
     def after_fork(**_: Any) -> None:
         die_with_parent(parent=worker)
         database.cache_clear()
-        if queue == SOLVE:
-            from certifier.seeding import PROPOSE
+        try:
+            if queue == SOLVE:
+                from certifier.seeding import PROPOSE
 
-            nursery = prepare(PROPOSE, NURSERY_S)
-            if asked.background:
-                give_way(niceness, nursery)
-        traces.configure(queue)
-        with suppress(BlockingIOError):  # once is enough
-            os.write(told, b"1")
+                nursery = prepare(PROPOSE, NURSERY_S)
+                if asked.background:
+                    give_way(niceness, nursery)
+            traces.configure(queue)
+        finally:  # Celery logs what went wrong, and has the process take work
+            with suppress(BlockingIOError):  # once is enough
+                os.write(told, b"1")
 
     @worker_process_shutdown.connect(weak=False)
     def before_end(**_: Any) -> None:

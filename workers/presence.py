@@ -78,8 +78,8 @@ class Presence:
         Args:
             consumer: Celery's, which takes the messages.
         """
-        self._consumer = consumer
         self.say(WorkerState.RUNNING)
+        self._consumer = consumer  # only now is it asked to pause, whose thread says the state that follows
 
     def run(self) -> None:
         """Tells and listens until the worker ends."""

@@ -10,8 +10,11 @@ work. This is given up as well when it lasts long and a new job waits, and is le
 
 from __future__ import annotations
 
+import logging
 import time
-from contextlib import nullcontext, suppress
+from contextlib import nullcontext
+
+from sqlalchemy.orm import Session
 
 from db import leases, pairs, steps, work, workers
 from db.session import UNAVAILABLE, database
@@ -21,6 +24,8 @@ from jobs.kind import GivesWay, giving_way
 from workers.app import send_work
 from workers.slots import Slots
 from workers.solver import Piece, do
+
+log = logging.getLogger(__name__)
 
 WAIT_SECONDS = 10.0
 """A process without a slot waits this long for work. Then the next message has it wait again."""
@@ -50,18 +55,21 @@ def _claim() -> tuple[pairs.Claim | steps.Claim | None, bool]:
 
     It also says whether it is of a new job.
     """
-    if database().disk.trouble():
-        return None, False
     with database().read() as session:
         new = work.newcomer(session)
         job_id = new or work.to_accept(session)
-        if job_id is None or workers.wanted(session, leases.parent_worker()) not in (None, WorkerState.RUNNING):
+        if job_id is None or not _takes_work(session):
             return None, False
     limits = settings()
     with database().write() as session:
         if new is None:
             return work.claim_region(session, job_id, lease_seconds=limits.lease_seconds), False
         return work.claim(session, new, lease_seconds=limits.lease_seconds, batch_seconds=limits.batch_seconds, fresh=True), True
+
+
+def _takes_work(session: Session) -> bool:
+    """Says whether the disk has room for what this process would save, and its worker is neither to pause nor to end."""
+    return not database().disk.trouble() and workers.wanted(session, leases.parent_worker()) in (None, WorkerState.RUNNING)
 
 
 class _Trial:
@@ -78,8 +86,13 @@ class _Trial:
         if self._slots.take() or time.monotonic() < self._until:
             return
         waits = False
-        with suppress(*UNAVAILABLE), database().read() as session:  # an outage is no reason to give anything up
-            waits = work.newcomer(session, instead_of=self._job_id, accepts=not self._is_new) is not None
+        try:
+            with database().read() as session:
+                waits = work.newcomer(session, instead_of=self._job_id, accepts=not self._is_new) is not None and _takes_work(session)
+        except UNAVAILABLE:
+            pass  # an outage is no reason to give anything up
+        except Exception:
+            log.exception("whether new jobs wait could not be said; the step goes on")
         if waits:
             raise GivesWay
         self._until = time.monotonic() + LOOK_SECONDS

@@ -248,18 +248,25 @@ def test_a_region_of_a_new_job_is_accepted_to_the_end(job_id: str, monkeypatch: 
     assert (step.state, lost(job_id)) == ("done", [])
 
 
-def test_a_short_outage_of_the_database_fails_no_step(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_look_at_the_database_that_fails_fails_no_step(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spare, "TRIAL_SECONDS", 0.0)
+    monkeypatch.setattr(spare, "LOOK_SECONDS", 0.0)
+    takes_work = True
+    monkeypatch.setattr(spare, "_takes_work", lambda session: takes_work)
     trial = spare._Trial(Slots(0), "the job", is_new=True)
     monkeypatch.setattr(spare.work, "newcomer", lambda session, instead_of, accepts: "another job")
     with pytest.raises(GivesWay):
         trial()
-
-    def gone(session: object, instead_of: str, accepts: bool) -> str:
-        raise OperationalError("", None, Exception("the server closed the connection"))
-
-    monkeypatch.setattr(spare.work, "newcomer", gone)
+    takes_work = False  # paused: what it holds, it does to its end
     trial()
+    takes_work = True
+    for problem in (OperationalError("", None, Exception("the server closed the connection")), ValueError("a fault of ours")):
+
+        def fails(session: object, instead_of: str, accepts: bool, problem: Exception = problem) -> str:
+            raise problem
+
+        monkeypatch.setattr(spare.work, "newcomer", fails)
+        trial()
 
 
 @pytest.mark.parametrize("loaded", [False, True])
