@@ -305,8 +305,8 @@ class Collision:
     """The argument, as ``start`` or ``via[0]``."""
     a: str
     b: str
-    depth: float | None
-    """How deep the padded bodies are in each other, in metres; None where that is not known."""
+    depth: float
+    """How deep the padded bodies are in each other, in metres."""
     free: Array | None
     """(n,) free joint positions near by; None where none were found."""
 

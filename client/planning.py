@@ -218,9 +218,8 @@ def _why_not(answer: dict[str, Any], units: Mapping[str, str]) -> str:
         bounds = " ".join(f"{word} {limit[side]:.10g}" for word, side in (("from", "lower"), ("to", "upper")) if limit[side] is not None)
         return f"{_field(limit['where'])}: joint {limit['joint']} is at {limit['value']:.10g} {unit}, and its limits are {bounds} {unit}"
     if touching := answer["collision"]:
-        how = "overlap" if touching["depth"] is None else f"overlap by {at_least_mm(touching['depth'])}"
         free = f"; free near by: {_place(touching['free'], units)}" if touching["free"] else ""
-        what = touching["condition"] or f"{touching['a']} and {touching['b']} {how}"
+        what = touching["condition"] or f"{touching['a']} and {touching['b']} overlap by {at_least_mm(touching['depth'])}"
         return f"{_field(touching['where'])}: {what}{free}"
     if reached := answer["reached"]:
         nearest = f"the nearest that was found is off by {1000 * reached['metres']:.3g} mm and {reached['radians']:.3g} rad"

@@ -163,7 +163,7 @@ class Collision(BaseModel):
     where: str = Field(description="The field of the request, as `start` or `via[0]`.", examples=["start"])
     a: str = Field(description="The first geometry of the pair.")
     b: str = Field(description="The second geometry of the pair.")
-    depth: float | None = Field(description="How deep the padded bodies are in each other, in metres; null where that is not known.")
+    depth: float = Field(description="How deep the padded bodies are in each other, in metres.")
     free: list[float] | None = Field(description="(n,), free joint positions near by; null where none were found.")
     condition: str | None = Field(
         default=None,

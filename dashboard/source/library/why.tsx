@@ -74,6 +74,6 @@ function beyond({ where, joint, value, lower, upper }: BeyondLimit, unit: "rad" 
 }
 
 function touching({ where, a, b, depth }: Collision): string {
-  const how = depth === null ? "" : ` With the padding, they overlap by ${(1000 * depth).toPrecision(3)} mm.`;
+  const how = ` With the padding, they overlap by ${(1000 * depth).toPrecision(3)} mm.`;
   return `${a} and ${b} touch at the ${where}.${how}`;
 }
