@@ -52,6 +52,7 @@ from api.routers import (
     workers,
 )
 from api.unanswered import Unanswered
+from api.warm_up import warm_up
 from api.writing import WRITERS
 from certifier.isolation.confinement import probed
 from certifier.scene.bundle import expect_bundles
@@ -142,7 +143,7 @@ def _routes() -> list[BaseRoute]:
 
 
 @asynccontextmanager
-async def _lifespan(_app: FastAPI) -> AsyncIterator[None]:
+async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     """Limits the threads that answer requests, and says how uploads are read.
 
     Each thread has its connection to the database, so more threads would only wait for each other.
@@ -150,6 +151,7 @@ async def _lifespan(_app: FastAPI) -> AsyncIterator[None]:
     to_thread.current_default_thread_limiter().total_tokens = THREADS
     log.info("uploads are read with: %s", await to_thread.run_sync(probed))
     expect_bundles()
+    await to_thread.run_sync(warm_up, app.state.database)
     yield
 
 

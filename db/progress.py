@@ -57,7 +57,7 @@ def of_jobs(session: Session, rows: Iterable[JobRow]) -> dict[Version, tuple[int
     counted = {one.job_id for one in iterations if one.state == IterationState.RUNNING and not one.parts and not one.together}
     left: dict[str, list[int]] = {}
     for states, some in (((PairState.SKIPPED,), counted), (_UNSETTLED, known.keys() - counted)):
-        left |= _in_states(session, states, [(one.job_id, one.number) for one in iterations if one.job_id in some])
+        left |= in_states(session, states, [(one.job_id, one.number) for one in iterations if one.job_id in some])
     found = {}
     for job_id, _, _, together, parts, reused in iterations:
         row, groups = known[job_id], {int(first): len(others) for first, others in together.items()}
@@ -69,7 +69,7 @@ def of_jobs(session: Session, rows: Iterable[JobRow]) -> dict[Version, tuple[int
     return found
 
 
-def _in_states(session: Session, states: Collection[PairState], iterations: Sequence[tuple[str, int]]) -> dict[str, list[int]]:
+def in_states(session: Session, states: Collection[PairState], iterations: Sequence[tuple[str, int]]) -> dict[str, list[int]]:
     """Returns the indices of the pairs of which a part is in one of the states in these iterations (job, index), by the job."""
     of_these = tuple_(PairRow.job_id, PairRow.iteration).in_(iterations)
     query = select(PairRow.job_id, PairRow.pair_index).where(of_these, PairRow.state.in_(states)).distinct()

@@ -1,0 +1,63 @@
+"""A process of the API has done what takes long once, before it takes requests."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy import event
+from sqlalchemy.engine.interfaces import CacheStats
+
+from api.app import create_app
+from api.reading import READERS
+from api.warm_up import warm_up
+from db import migrate
+from db.session import Database
+from tests.api.conftest import BASE_URL
+from tests.db.builders import a_running_job
+from tests.services import Postgres, Queue, free_port
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def database(request: pytest.FixtureRequest) -> Iterator[Database]:
+    if request.param == "sqlite":
+        url: str = request.getfixturevalue("sqlite_url")
+    else:
+        postgres: Postgres = request.getfixturevalue("postgres")
+        migrate.upgrade(url := postgres.new_database())
+    database = Database(url)
+    yield database
+    database.close()
+
+
+def test_requests_build_no_query_and_open_no_connection(database: Database, queue: Queue, environment: pytest.MonkeyPatch) -> None:
+    with database.write() as session:
+        job = a_running_job(session)
+    environment.setenv("CIRIS_REDIS_URL", queue.url)
+    built = []
+
+    def note(_connection: Any, _cursor: Any, statement: str, _parameters: Any, context: Any, _many: bool) -> None:
+        if context.cache_hit not in (CacheStats.CACHE_HIT, CacheStats.NO_DIALECT_SUPPORT) and context.compiled is not None:
+            built.append(statement)
+
+    with TestClient(create_app(database), base_url=BASE_URL) as client:
+        opened = database.connections()
+        assert sum(number for (_, use), number in opened.items() if use == "idle") >= READERS
+        event.listen(database.reader, "before_cursor_execute", note)
+        for path in (job.id, f"{job.id}/events", f"{job.id}/pairs?limit=100"):
+            assert client.get(f"/v1/jobs/{path}").is_success
+        assert client.get("/v1/jobs?limit=20").is_success
+        assert client.get(f"/v1/regions?scene={job.scene_id}&limit=20").is_success
+    print("\n".join(s[:400] for s in built))
+    assert built == []
+    assert database.connections() == opened
+
+
+def test_a_database_that_cannot_be_reached_stops_nothing(caplog: pytest.LogCaptureFixture) -> None:
+    away = Database(f"postgresql+psycopg://ciris@127.0.0.1:{free_port()}/ciris")
+    with caplog.at_level(logging.WARNING):
+        warm_up(away)
+    assert "the first requests will take longer" in caplog.text
