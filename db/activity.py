@@ -39,12 +39,16 @@ class Kept:
 
     Attributes:
         clock_ahead: by how much the database's clock is before this machine's.
+        parents: the jobs that have made jobs that have not ended.
+        waiting: the jobs that have a step that has not ended.
         held: until when the work of a job is held at the latest, for the jobs of which some is.
         workers: what :func:`db.workers.counts` returns.
         ahead: the first jobs that wait for a worker of a kind.
     """
 
     clock_ahead: timedelta | None = None
+    parents: frozenset[str] | None = None
+    waiting: frozenset[str] | None = None
     held: dict[str, datetime] | None = None
     workers: dict[tuple[str, str], int] | None = None
     queue_silent: bool = False
@@ -60,14 +64,17 @@ def of_jobs(session: Session, rows: Sequence[JobRow], kept: Kept | None = None) 
     if not alive:
         return found
     begun = [row for row in alive if row.state == JobState.RUNNING]
-    parents = [row.id for row in begun if row.pieces is None]  # what has pairs of its own has no jobs below it
+    if kept.parents is None:
+        with all_projects(session):
+            kept.parents = frozenset(session.scalars(_parents()))
+    parents = [row.id for row in begun if row.id in kept.parents]
     children = session.scalars(_below(), {"parents": parents}).all() if parents else ()
     below = of_jobs(session, children, kept) if children else {}
     if kept.held is None or any(row.running_pairs > 0 and row.id not in kept.held for row in alive):
         kept.held = _held(session)
     held = kept.held
-    idle = [row.id for row in begun if row.id not in held and row.open_pairs == 0]
-    waiting = set(session.scalars(_waiting(), {"jobs": idle})) if idle else set()
+    if kept.waiting is None:
+        kept.waiting = frozenset(session.scalars(_waiting()))
     if kept.clock_ahead is None:
         kept.clock_ahead = clock.now(session) - utcnow()
     now = utcnow() + kept.clock_ahead
@@ -78,7 +85,7 @@ def of_jobs(session: Session, rows: Sequence[JobRow], kept: Kept | None = None) 
             found[row.id] = WORKING
         elif row.id in held:
             found[row.id] = STALLED
-        elif row.open_pairs > 0 or row.id in waiting:
+        elif row.open_pairs > 0 or row.id in kept.waiting:
             found[row.id] = queues.of_work(row.id)
         elif grown:
             found[row.id] = next((said for said in grown if said != JobState.CANCELLING), ENDING)
@@ -165,6 +172,12 @@ def _held_of(model: type[PairRow] | type[StepRow]) -> Select[str, Any]:
 
 
 @cache
+def _parents() -> Select[str | None]:
+    """Returns the query for the jobs that have made jobs that have not ended."""
+    return select(JobRow.parent_id).where(JobRow.parent_id.is_not(None), JobRow.state.in_(unfinished(JOB))).distinct()
+
+
+@cache
 def _below() -> Select[JobRow]:
     """Returns the query for the unfinished jobs that some jobs have made."""
     return select(JobRow).where(JobRow.parent_id.in_(bindparam("parents", expanding=True)), JobRow.state.in_(unfinished(JOB)))
@@ -172,5 +185,5 @@ def _below() -> Select[JobRow]:
 
 @cache
 def _waiting() -> Select[str]:
-    """Returns the query for which of some jobs have a step that has not ended."""
-    return select(StepRow.job_id).where(StepRow.job_id.in_(bindparam("jobs", expanding=True)), StepRow.state.in_(unfinished(STEP)))
+    """Returns the query for which jobs have a step that has not ended."""
+    return select(StepRow.job_id).where(StepRow.state.in_(unfinished(STEP))).distinct()
