@@ -46,10 +46,12 @@ def _ask_for_callers(session: Session) -> None:
 
 def _ask_for_jobs(session: Session) -> None:
     """Asks for what is shown of a job, and for lists of jobs and regions, of a job and a scene that do not exist."""
-    job = JobRow(id=NOBODY, state=JobState.RUNNING, turn=0, event_seq=0, open_pairs=1, running_pairs=0, pieces=1)
+    seeded, seeding = (
+        JobRow(id=NOBODY, state=JobState.RUNNING, turn=0, event_seq=0, open_pairs=pairs, running_pairs=0, pieces=1) for pairs in (1, 0)
+    )
     session.get(JobRow, NOBODY)
-    activity.of_jobs(session, [job])
-    progress.of_jobs(session, [job])
+    activity.of_jobs(session, [seeded, seeding])
+    progress.of_jobs(session, [seeded])
     progress.in_states(session, [PairState.SKIPPED], [(NOBODY, 0)])
     labels.of_jobs(session, [NOBODY])
     regions.shares(session, [NOBODY])

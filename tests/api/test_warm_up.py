@@ -14,10 +14,10 @@ from sqlalchemy.engine.interfaces import CacheStats
 from api.app import create_app
 from api.reading import READERS
 from api.warm_up import warm_up
-from db import migrate
+from db import jobs, migrate, steps
 from db.session import Database
 from tests.api.conftest import BASE_URL
-from tests.db.builders import a_running_job
+from tests.db.builders import a_job, a_running_job
 from tests.services import Postgres, Queue, free_port
 
 
@@ -35,7 +35,9 @@ def database(request: pytest.FixtureRequest) -> Iterator[Database]:
 
 def test_requests_build_no_query_and_open_no_connection(database: Database, queue: Queue, environment: pytest.MonkeyPatch) -> None:
     with database.write() as session:
-        job = a_running_job(session)
+        job, seeding = a_running_job(session), a_job(session)
+        jobs.start(session, seeding)
+        steps.add(session, seeding, "propose", {})
     environment.setenv("CIRIS_REDIS_URL", queue.url)
     built = []
 
@@ -47,7 +49,7 @@ def test_requests_build_no_query_and_open_no_connection(database: Database, queu
         opened = database.connections()
         assert sum(number for (_, use), number in opened.items() if use == "idle") >= READERS
         event.listen(database.reader, "before_cursor_execute", note)
-        for path in (job.id, f"{job.id}/events", f"{job.id}/pairs?limit=100"):
+        for path in (job.id, seeding.id, f"{job.id}/events", f"{job.id}/pairs?limit=100"):
             assert client.get(f"/v1/jobs/{path}").is_success
         assert client.get("/v1/jobs?limit=20").is_success
         assert client.get(f"/v1/regions?scene={job.scene_id}&limit=20").is_success

@@ -170,6 +170,26 @@ def test_a_cover_that_ends_is_not_called_cancelled(db: Database) -> None:
         assert does(session, cover) == ["ending: what it has begun is being stopped"]
 
 
+def test_who_keeps_what_was_asked_sees_work_that_came_since(db: Database) -> None:
+    kept = activity.Kept()
+    with db.write() as session:
+        crew(session, CONTROL)
+        former, job, cover = (a_job(session) for _ in range(3))
+        for row in (former, job, cover):
+            jobs.start(session, row)
+        steps.add(session, former, "propose", {})
+        assert activity.of_jobs(session, [former, job, cover], kept) == {
+            former.id: "queued: no worker",
+            job.id: "queued: next",
+            cover.id: "queued: next",
+        }
+        steps.add(session, job, "propose", {})
+        child = a_job(session, parent_id=cover.id, number=0)
+        jobs.start(session, child)
+        steps.add(session, child, "propose", {})
+        assert activity.of_jobs(session, [job, cover], kept) == {job.id: "queued: no worker", cover.id: "queued: no worker"}
+
+
 @pytest.mark.parametrize("working", [True, False])
 def test_a_cover_does_what_its_regions_do(db: Database, working: bool) -> None:
     with db.write() as session:
