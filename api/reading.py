@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import inspect
 import json
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from functools import partial, wraps
 from typing import Any
 
@@ -20,8 +21,8 @@ from api.turns import Turns
 
 READERS = 4
 """This many threads answer reading routes. Each takes one of the process' database connections while it reads."""
-LONG = 500
-"""A list of more models is written item by item."""
+TOGETHER, PAUSE_SECONDS = 20, 0.00005
+"""While several projects ask, the one whose long list is written gives way for PAUSE_SECONDS after so many items, which take 0.4 ms."""
 _threads = Turns("read", READERS, READERS - 1)
 
 
@@ -54,8 +55,18 @@ def _in_one_visit(endpoint: Callable[..., BaseModel]) -> Callable[..., Any]:
 
 
 def _written(answer: BaseModel) -> str:
-    """Returns the JSON of an answer. It writes long lists item by item: while one call writes them, no other thread goes on."""
-    long = {name: value for name, value in answer if isinstance(value, list) and len(value) > LONG and isinstance(value[0], BaseModel)}
-    rest = answer.model_dump_json(exclude=set(long))
-    lists = [f"{json.dumps(name)}:[{','.join(item.model_dump_json() for item in items)}]" for name, items in long.items()]
+    """Returns the JSON of an answer. It makes and writes one item after the other of a list that the route gives as an iterator of models.
+
+    So no call writes, and no pass of the garbage collector looks at, thousands of models: no other thread would go on meanwhile.
+    """
+    given = {name: value for name, value in answer if isinstance(value, Iterator)}
+    rest = answer.model_dump_json(exclude=set(given))
+    lists = [f"{json.dumps(name)}:[{','.join(_one_by_one(items))}]" for name, items in given.items()]
     return "{" + ",".join(filter(None, (rest[1:-1], *lists))) + "}"
+
+
+def _one_by_one(items: Iterator[BaseModel]) -> Iterator[str]:
+    for number, item in enumerate(items):
+        if number % TOGETHER == 0 and _threads.shared:
+            time.sleep(PAUSE_SECONDS)
+        yield item.model_dump_json()

@@ -35,6 +35,11 @@ class Turns:
         """Calls the function in a thread when it is the project's turn. What is of no project (None) may have all threads."""
         return await asyncio.wrap_future(self._asked(project, function))
 
+    @property
+    def shared(self) -> bool:
+        """Whether several projects asked lately."""
+        return len(self._asked_at) > 1
+
     def _asked(self, project: str | None, function: Callable[[], Answer]) -> Future[Answer]:
         done: Future[Answer] = Future()
         with self._lock:

@@ -55,6 +55,20 @@ def test_projects_take_turns_at_one_thread() -> None:
     assert order == list("abcabaa")
 
 
+def test_threads_are_shared_while_several_projects_ask(monkeypatch: pytest.MonkeyPatch) -> None:
+    turns = Turns("test", threads=1, of_project=1)
+
+    def shared_after(*projects: str | None) -> bool:
+        for project in projects:
+            asyncio.run(turns.run(project, lambda: None))
+        return turns.shared
+
+    assert not shared_after("one", "one", None)
+    assert shared_after("another")
+    monkeypatch.setattr("api.turns.LATELY_SECONDS", 0.0)
+    assert not shared_after("one")
+
+
 def test_an_error_holds_nothing_once_it_is_answered() -> None:
     """The service seldom looks for garbage, and what a request has read may be large."""
     turns, read = Turns("test", threads=1, of_project=1), list[weakref.ref[Event]]()
