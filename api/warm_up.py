@@ -26,8 +26,10 @@ NOBODY = "00000000-0000-0000-0000-000000000000"
 
 
 def warm_up(db: Database) -> None:
-    """Asks in one connection for each reading thread, and in one more for keys. Where the database does not answer, the
-    requests will say so."""
+    """Asks in one connection for each reading thread, and in one more for keys.
+
+    Where the database does not answer, it leaves it to the requests to say so.
+    """
     of_project = db.of(DEFAULT_PROJECT)
     try:
         with ExitStack() as held:
@@ -47,7 +49,7 @@ def _ask_for_callers(session: Session) -> None:
 def _ask_for_jobs(session: Session) -> None:
     """Asks for what is shown of a job, and for lists of jobs and regions, of a job and a scene that do not exist."""
     seeded, seeding = (
-        JobRow(id=NOBODY, state=JobState.RUNNING, turn=0, event_seq=0, open_pairs=pairs, running_pairs=0, pieces=1) for pairs in (1, 0)
+        JobRow(id=NOBODY, state=JobState.RUNNING, turn=0, event_seq=0, open_pairs=number, running_pairs=0, pieces=1) for number in (1, 0)
     )
     session.get(JobRow, NOBODY)
     activity.of_jobs(session, [seeded, seeding])

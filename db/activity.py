@@ -64,10 +64,7 @@ def of_jobs(session: Session, rows: Sequence[JobRow], kept: Kept | None = None) 
     if not alive:
         return found
     begun = [row for row in alive if row.state == JobState.RUNNING]
-    if kept.held is None or any(row.running_pairs > 0 and row.id not in kept.held for row in alive):
-        kept.held = _held(session)
-    held = kept.held
-    idle = {row.id for row in begun if row.id not in held and row.open_pairs == 0}
+    idle = {row.id for row in begun if row.open_pairs == 0 and row.running_pairs == 0}
     if not idle <= kept.waiting | kept.parents:
         kept.waiting = frozenset(session.scalars(_waiting()))
         with all_projects(session):
@@ -75,6 +72,9 @@ def of_jobs(session: Session, rows: Sequence[JobRow], kept: Kept | None = None) 
     parents = [row.id for row in begun if row.id in kept.parents]
     children = session.scalars(_below(), {"parents": parents}).all() if parents else ()
     below = of_jobs(session, children, kept) if children else {}
+    if kept.held is None or any(row.running_pairs > 0 and row.id not in kept.held for row in alive):
+        kept.held = _held(session)
+    held = kept.held
     if kept.clock_ahead is None:
         kept.clock_ahead = clock.now(session) - utcnow()
     now = utcnow() + kept.clock_ahead

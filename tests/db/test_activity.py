@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import update
 from sqlalchemy.orm import Session
 
-from db import activity, clock, jobs, projects, scenes, steps, work, workers
+from db import activity, clock, jobs, leases, projects, scenes, steps, work, workers
 from db.models import DEFAULT_PROJECT, JobRow, PairRow, WorkerRow
 from db.session import Database
 from db.states import JobState, WorkerState
@@ -188,6 +188,21 @@ def test_who_keeps_what_was_asked_sees_work_that_came_since(db: Database) -> Non
         jobs.start(session, child)
         steps.add(session, child, "propose", {})
         assert activity.of_jobs(session, [job, cover], kept) == {job.id: "queued: no worker", cover.id: "queued: no worker"}
+
+
+def test_a_cover_works_while_its_regions_grow_although_it_lost_its_own_worker(db: Database) -> None:
+    with db.write() as session:
+        crew(session, SOLVER, CONTROL)
+        cover = a_job(session)
+        jobs.start(session, cover)
+        child = a_job(session, parent_id=cover.id, number=0)
+        jobs.start(session, child)
+        for row in (cover, child):
+            step = steps.add(session, row, "propose", {})
+            session.flush()
+            step.state, step.lease_until = leases.RUNNING, clock.now(session) + timedelta(seconds=-1 if row is cover else 60)
+        session.flush()
+        assert does(session, cover, child) == ["working", "working"]
 
 
 @pytest.mark.parametrize("working", [True, False])
