@@ -22,7 +22,7 @@ from api.turns import Turns
 READERS = 4
 """This many threads answer reading routes. Each takes one of the process' database connections while it reads."""
 TOGETHER, PAUSE_SECONDS = 20, 0.00005
-"""While several projects ask, the one whose long list is written gives way for PAUSE_SECONDS after so many items, which take 0.4 ms."""
+"""While several projects ask, the one whose long list is written gives way for PAUSE_SECONDS after TOGETHER items, which take 0.4 ms."""
 _threads = Turns("read", READERS, READERS - 1)
 
 

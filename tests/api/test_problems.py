@@ -163,8 +163,8 @@ def test_an_unexpected_error_tells_nothing_of_the_inside(database: Database, cli
     def fail(*_args: object, **_options: object) -> None:
         raise RuntimeError("a secret")
 
-    monkeypatch.setattr(jobs, "page", fail)
     with TestClient(create_app(database), base_url=BASE_URL, raise_server_exceptions=False) as quiet:
+        monkeypatch.setattr(jobs, "page", fail)
         answer = quiet.get("/v1/jobs")
     assert (answer.status_code, answer.json()["code"]) == (500, "internal")
     assert "secret" not in answer.text
