@@ -9,12 +9,12 @@ from contextlib import asynccontextmanager
 from functools import cache, partial
 from typing import Any
 
-from anyio import to_thread
+from anyio import move_on_after, to_thread
 from fastapi import APIRouter, FastAPI
 from fastapi.routing import APIRoute
 from starlette.routing import BaseRoute
 
-from api import delivery, document, guard, login, problems
+from api import delivery, document, guard, login, problems, warm_up
 from api.access import Keyring
 from api.access_log import AccessLog
 from api.announce import Announcer
@@ -52,7 +52,6 @@ from api.routers import (
     workers,
 )
 from api.unanswered import Unanswered
-from api.warm_up import warm_up
 from api.writing import WRITERS
 from certifier.isolation.confinement import probed
 from certifier.scene.bundle import expect_bundles
@@ -151,7 +150,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     to_thread.current_default_thread_limiter().total_tokens = THREADS
     log.info("uploads are read with: %s", await to_thread.run_sync(probed))
     expect_bundles()
-    await to_thread.run_sync(warm_up, app.state.database)
+    with move_on_after(warm_up.SECONDS):
+        await to_thread.run_sync(warm_up.warm_up, app.state.database, abandon_on_cancel=True)
     yield
 
 

@@ -8,7 +8,6 @@ is sent across sites. A caller without a key is refused before the body of the r
 
 from __future__ import annotations
 
-import asyncio
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -23,7 +22,7 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from api.access import Caller, Keyring, presented
-from api.limits import LONGEST_SECONDS, Buckets, Spacing
+from api.limits import Buckets
 from api.oidc import CALLBACK
 from certifier.errors import CirisError
 from db.session import UNAVAILABLE
@@ -44,10 +43,6 @@ SIGN_INS_PER_SECOND = 5.0
 """One address may return from the identity provider this often, on average. At each return, the service asks the provider."""
 OF_PROJECT = 2.0
 """All keys and people of a project together may make that many times as many requests as one of them."""
-AT_ONCE = 8
-"""While several projects ask, a project may make AT_ONCE requests at once. The next ones come as often as one key or person may ask."""
-REFUSED_SECONDS = 0.5
-"""A request that is one too many is refused after this time. So who asks again at once does not keep the service busy with refusals."""
 WATCHED = frozenset({"/metrics"})
 """Monitoring asks for these. They are answered while the database hangs."""
 
@@ -85,7 +80,6 @@ class Guard:
         self._app, self._keyring, self._hosts, self._respond = app, keyring, hosts, respond
         self._keys, self._addresses, self._sign_ins = Buckets(rate), Buckets(rate), Buckets(SIGN_INS_PER_SECOND)
         self._projects = Buckets(OF_PROJECT * rate)
-        self._spacing = Spacing(rate, AT_ONCE)
         self._held = Counter[str | None]()
         """Maps a project to the number of bytes of the bodies that are held for it."""
 
@@ -103,8 +97,6 @@ class Guard:
             _check_encoding(headers)
             await self._check_caller(scope, headers)
         except (CirisError, *UNAVAILABLE) as error:
-            if isinstance(error, TooManyRequests):
-                await asyncio.sleep(REFUSED_SECONDS)
             await self._respond(Request(scope), error)(scope, receive, send)
             return
         caller: Caller | None = scope.get("state", {}).get("caller")
@@ -148,10 +140,8 @@ class Guard:
             caller = await self._keyring.newcomer(given)
             if caller is None:
                 raise KeyNeeded(headers)
-        if caller is not None and caller.id:
-            if (wait := self._projects.take(caller.project)) > 0 or (wait := self._spacing.delay(caller.project)) > LONGEST_SECONDS:
-                raise TooManyRequests(wait, "project")
-            await asyncio.sleep(wait)
+        if caller is not None and caller.id and (wait := self._projects.take(caller.project)) > 0:
+            raise TooManyRequests(wait, "project")
         scope.setdefault("state", {})["caller"] = caller
 
 

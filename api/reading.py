@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial, wraps
 from typing import Any
 
@@ -21,6 +21,8 @@ from api.turns import Turns
 
 READERS = 4
 """This many threads answer reading routes. Each takes one of the process' database connections while it reads."""
+LONG = 500
+"""A list of more models is written item by item."""
 TOGETHER, PAUSE_SECONDS = 20, 0.00005
 """While several projects ask, the one whose long list is written gives way for PAUSE_SECONDS after TOGETHER items, which take 0.4 ms."""
 _threads = Turns("read", READERS, READERS - 1)
@@ -55,18 +57,23 @@ def _in_one_visit(endpoint: Callable[..., BaseModel]) -> Callable[..., Any]:
 
 
 def _written(answer: BaseModel) -> str:
-    """Returns the JSON of an answer. It makes and writes one item after the other of a list that the route gives as an iterator of models.
+    """Returns the JSON of an answer. It writes long lists item by item: while one call writes them, no other thread goes on.
 
-    So no call writes, and no pass of the garbage collector looks at, thousands of models: no other thread would go on meanwhile.
+    A route may give a list as an iterator of models. Then each is made when it is written, and no pass of the garbage collector, during
+    which no thread goes on either, looks at thousands of them.
     """
-    given = {name: value for name, value in answer if isinstance(value, Iterator)}
-    rest = answer.model_dump_json(exclude=set(given))
-    lists = [f"{json.dumps(name)}:[{','.join(_one_by_one(items))}]" for name, items in given.items()]
+    long = {name: value for name, value in answer if _is_long(value)}
+    rest = answer.model_dump_json(exclude=set(long))
+    lists = [f"{json.dumps(name)}:[{','.join(_one_by_one(items))}]" for name, items in long.items()]
     return "{" + ",".join(filter(None, (rest[1:-1], *lists))) + "}"
 
 
-def _one_by_one(items: Iterator[BaseModel]) -> Iterator[str]:
-    for number, item in enumerate(items):
+def _is_long(value: Any) -> bool:
+    return isinstance(value, Iterator) or (isinstance(value, list) and len(value) > LONG and isinstance(value[0], BaseModel))
+
+
+def _one_by_one(items: Iterable[BaseModel]) -> Iterator[str]:
+    for number, item in enumerate(items, 1):
         if number % TOGETHER == 0 and _threads.shared:
             time.sleep(PAUSE_SECONDS)
         yield item.model_dump_json()

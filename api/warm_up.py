@@ -21,22 +21,21 @@ from db.states import JobState, PairState
 
 log = logging.getLogger(__name__)
 
+SECONDS = 5.0
+"""The process does not wait longer than this before it takes requests."""
 NOBODY = "00000000-0000-0000-0000-000000000000"
 """No row has this id."""
 
 
 def warm_up(db: Database) -> None:
-    """Asks in one connection for each reading thread, and in one more for keys.
-
-    Where the database does not answer, it leaves it to the requests to say so.
-    """
+    """Asks in one connection for each reading thread, and in one more for keys. What is wrong with the database, requests will say."""
     of_project = db.of(DEFAULT_PROJECT)
     try:
         with ExitStack() as held:
             _ask_for_callers(held.enter_context(db.read()))
             for _ in range(READERS):
                 _ask_for_jobs(held.enter_context(of_project.read()))
-    except SQLAlchemyError as error:
+    except (SQLAlchemyError, ValueError) as error:  # ValueError: a row cannot be read
         log.warning("the first requests will take longer, because the database could not be asked beforehand: %s", error)
 
 
@@ -47,7 +46,7 @@ def _ask_for_callers(session: Session) -> None:
 
 
 def _ask_for_jobs(session: Session) -> None:
-    """Asks for what is shown of a job, and for lists of jobs and regions, of a job and a scene that do not exist."""
+    """Asks for what is shown of a job that does not exist, and for lists of jobs and regions."""
     seeded, seeding = (
         JobRow(id=NOBODY, state=JobState.RUNNING, turn=0, event_seq=0, open_pairs=number, running_pairs=0, pieces=1) for number in (1, 0)
     )

@@ -39,8 +39,8 @@ class Kept:
 
     Attributes:
         clock_ahead: by how much the database's clock is before this machine's.
-        parents: the jobs that have made jobs that have not ended.
-        waiting: the jobs that have a step that has not ended.
+        parents: those of the jobs asked for that have made jobs that have not ended.
+        waiting: those of them that have a step that has not ended.
         held: until when the work of a job is held at the latest, for the jobs of which some is.
         workers: what :func:`db.workers.counts` returns.
         ahead: the first jobs that wait for a worker of a kind.
@@ -65,10 +65,9 @@ def of_jobs(session: Session, rows: Sequence[JobRow], kept: Kept | None = None) 
         return found
     begun = [row for row in alive if row.state == JobState.RUNNING]
     idle = {row.id for row in begun if row.open_pairs == 0 and row.running_pairs == 0}
-    if not idle <= kept.waiting | kept.parents:
-        kept.waiting = frozenset(session.scalars(_waiting()))
-        with all_projects(session):
-            kept.parents = frozenset(session.scalars(_parents()))
+    if new := idle - kept.waiting - kept.parents:
+        kept.waiting |= set(session.scalars(_waiting(), {"jobs": list(new)}))
+        kept.parents |= set(session.scalars(_parents(), {"jobs": list(new)}))
     parents = [row.id for row in begun if row.id in kept.parents]
     children = session.scalars(_below(), {"parents": parents}).all() if parents else ()
     below = of_jobs(session, children, kept) if children else {}
@@ -173,8 +172,9 @@ def _held_of(model: type[PairRow] | type[StepRow]) -> Select[str, Any]:
 
 @cache
 def _parents() -> Select[str | None]:
-    """Returns the query for the jobs that have made jobs that have not ended."""
-    return select(JobRow.parent_id).where(JobRow.parent_id.is_not(None), JobRow.state.in_(unfinished(JOB))).distinct()
+    """Returns the query for which of some jobs have made jobs that have not ended."""
+    made = (JobRow.parent_id.in_(bindparam("jobs", expanding=True)), JobRow.state.in_(unfinished(JOB)))
+    return select(JobRow.parent_id).where(*made).distinct()
 
 
 @cache
@@ -185,5 +185,5 @@ def _below() -> Select[JobRow]:
 
 @cache
 def _waiting() -> Select[str]:
-    """Returns the query for which jobs have a step that has not ended."""
-    return select(StepRow.job_id).where(StepRow.state.in_(unfinished(STEP))).distinct()
+    """Returns the query for which of some jobs have a step that has not ended."""
+    return select(StepRow.job_id).where(StepRow.job_id.in_(bindparam("jobs", expanding=True)), StepRow.state.in_(unfinished(STEP)))

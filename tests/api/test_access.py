@@ -5,9 +5,7 @@ from __future__ import annotations
 import asyncio
 import secrets
 import time
-from collections import Counter
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
 import httpx2
@@ -21,8 +19,8 @@ from api import access
 from api.access import KEYS_SECONDS, Caller, Keyring, _Needs
 from api.app import create_app
 from api.delivery import every
-from api.guard import PUBLIC, REFUSED_SECONDS, _network
-from api.limits import LONGEST_SECONDS, MAX_BUCKETS, Buckets, Spacing
+from api.guard import PUBLIC, _network
+from api.limits import MAX_BUCKETS, Buckets
 from certifier.errors import CirisError
 from certifier.model import Scene
 from ciris.synchronous.client import Client
@@ -207,7 +205,6 @@ def hasty(database: Database, environment: pytest.MonkeyPatch) -> Iterator[TestC
 def test_who_asks_too_often_is_to_wait(hasty: TestClient, database: Database) -> None:
     assert [hasty.get("/v1/jobs").status_code for _ in range(4)] == [200] * 4
     refused = next(answer for _ in range(100) if (answer := hasty.get("/v1/jobs")).status_code != 200)
-    assert refused.elapsed.total_seconds() >= REFUSED_SECONDS
     assert (refused.status_code, refused.json()["code"], refused.headers["retry-after"]) == (429, "too_many_requests", "1")
 
 
@@ -276,9 +273,9 @@ def test_strangers_wait_before_anything_is_read_for_them(hasty: TestClient, data
         pass
     with readings(database) as seen:
         began = time.monotonic()
-        statuses = [hasty.get("/v1/jobs", headers=bearer(an_invented_key())).status_code for _ in range(6)]
+        statuses = [hasty.get("/v1/jobs", headers=bearer(an_invented_key())).status_code for _ in range(50)]
         allowed = statuses.count(401)
-        assert statuses.count(429) == 6 - allowed > 0
+        assert statuses.count(429) == 50 - allowed
         assert len(seen) <= allowed + 1 + (time.monotonic() - began) / KEYS_SECONDS
     assert hasty.get("/v1/jobs", headers=bearer(key)).status_code == 200, "who has a key does not wait for those behind the same address"
 
@@ -462,37 +459,6 @@ def test_strangers_cannot_fill_the_memory() -> None:
     for i in range(2 * MAX_BUCKETS):
         buckets.take(str(i))
     assert len(buckets._buckets) == MAX_BUCKETS
-
-
-def test_requests_of_projects_come_evenly_while_several_ask() -> None:
-    now = [0.0]
-    spacing = Spacing(10.0, 2, clock=lambda: now[0])
-    assert [spacing.delay("one") for _ in range(5)] == [0.0] * 5, "nobody else asks"
-    assert spacing.delay("other") == 0.0
-    assert [spacing.delay("one") for _ in range(4)] == pytest.approx([0.0, 0.0, 0.1, 0.2])
-    assert spacing.delay("other") == 0.0, "who asks seldom never waits"
-    now[0] = 0.25
-    assert spacing.delay("one") == pytest.approx(0.05), "as if they had come evenly"
-    while (delay := spacing.delay("one")) <= LONGEST_SECONDS:
-        pass
-    assert spacing.delay("one") == delay, "what is refused makes nobody wait"
-    now[0] = 20.0
-    assert [spacing.delay("one") for _ in range(5)] == [0.0] * 5
-
-
-def test_who_asks_too_often_beside_another_project_is_refused(database: Database, environment: pytest.MonkeyPatch) -> None:
-    environment.setenv("CIRIS_REQUESTS_PER_SECOND", "20")
-    one, second = a_key(database, Scope.READ, "one"), a_key(database, Scope.READ, "second")
-    with database.write() as session:
-        projects.add(session, "other")
-        other = keys.add(session, "other", Scope.READ, "other")
-    with TestClient(create_app(database), base_url=BASE_URL) as client, ThreadPoolExecutor(60) as callers:
-        assert client.get("/v1/project", headers=bearer(other)).status_code == 200
-        began = time.monotonic()
-        statuses = Counter(callers.map(lambda i: client.get("/v1/project", headers=bearer((one, second)[i % 2])).status_code, range(60)))
-        assert time.monotonic() - began > 1.5
-        assert client.get("/v1/project", headers=bearer(other)).elapsed.total_seconds() < 1
-    assert set(statuses) == {200, 429}
 
 
 @pytest.mark.parametrize("value", ["", "two words", "na\u00efve"])

@@ -135,16 +135,6 @@ def reads_that_last(url: str, keys_of_others: list[str]) -> Iterator[Counter[int
 
 
 @contextmanager
-def requests_without_a_pause(url: str, keys_of_others: list[str]) -> Iterator[Counter[int]]:
-    """Thirty-two clients ask for something small, again and again, whether they are refused or not."""
-    with httpx2.Client(base_url=url, headers={"Authorization": f"Bearer {keys_of_others[0]}"}) as client:
-        (job,) = client.get("/v1/jobs").json()["jobs"]
-    with all_the_time(url, keys_of_others, 32, lambda client: client.get(f"/v1/jobs/{job['id']}/events")) as answered:
-        yield answered
-    assert set(answered) <= {200, 429}
-
-
-@contextmanager
 def streams_held_open(url: str, keys_of_others: list[str]) -> Iterator[Counter[int]]:
     """Hundreds of connections listen to the events of a project."""
     with ExitStack() as held:
@@ -167,7 +157,7 @@ def jobs_of_nine_keys(url: str, keys_of_others: list[str]) -> Iterator[None]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("attack", [uploads_that_last, jobs_of_nine_keys, reads_that_last, requests_without_a_pause, streams_held_open])
+@pytest.mark.parametrize("attack", [uploads_that_last, jobs_of_nine_keys, reads_that_last, streams_held_open])
 def test_the_work_of_another_project_costs_requests_little(
     attack: Callable[[str, list[str]], AbstractContextManager[object]], tmp_path: Path
 ) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from sqlalchemy import event
+from sqlalchemy import event, text
 from sqlalchemy.engine.interfaces import CacheStats
 
 from api.app import create_app
@@ -53,7 +53,6 @@ def test_requests_build_no_query_and_open_no_connection(database: Database, queu
             assert client.get(f"/v1/jobs/{path}").is_success
         assert client.get("/v1/jobs?limit=20").is_success
         assert client.get(f"/v1/regions?scene={job.scene_id}&limit=20").is_success
-    print("\n".join(s[:400] for s in built))
     assert built == []
     assert database.connections() == opened
 
@@ -63,3 +62,19 @@ def test_a_database_that_cannot_be_reached_stops_nothing(caplog: pytest.LogCaptu
     with caplog.at_level(logging.WARNING):
         warm_up(away)
     assert "the first requests will take longer" in caplog.text
+
+
+def test_a_database_that_hangs_does_not_keep_the_process_from_taking_requests(
+    postgres: Postgres, queue: Queue, environment: pytest.MonkeyPatch
+) -> None:
+    migrate.upgrade(url := postgres.new_database())
+    environment.setenv("CIRIS_REDIS_URL", queue.url)
+    environment.setattr("api.warm_up.SECONDS", 0.5)
+    database, other = Database(url), Database(url)
+    with other.write() as session:
+        session.execute(text("LOCK TABLE jobs"))
+        with TestClient(create_app(database), base_url=BASE_URL) as client:
+            assert client.get("/healthz").status_code == 200
+            session.rollback()
+    database.close()
+    other.close()
