@@ -65,11 +65,11 @@ def of_jobs(session: Session, rows: Sequence[JobRow], kept: Kept | None = None) 
         return found
     begun = [row for row in alive if row.state == JobState.RUNNING]
     idle = {row.id for row in begun if row.open_pairs == 0 and row.running_pairs == 0}
-    if new := idle - kept.waiting - kept.parents:
-        kept.waiting |= set(session.scalars(_waiting(), {"jobs": list(new)}))
-        kept.parents |= set(session.scalars(_parents(), {"jobs": list(new)}))
-    parents = [row.id for row in begun if row.id in kept.parents]
-    children = session.scalars(_below(), {"parents": parents}).all() if parents else ()
+    new = idle - kept.waiting - kept.parents
+    kept.waiting |= set(session.scalars(_waiting(), {"jobs": list(new)})) if new else set()
+    parents = new | (idle & kept.parents)
+    children = session.scalars(_below(), {"parents": list(parents)}).all() if parents else ()
+    kept.parents |= {child.parent_id for child in children if child.parent_id is not None}
     below = of_jobs(session, children, kept) if children else {}
     if kept.held is None or any(row.running_pairs > 0 and row.id not in kept.held for row in alive):
         kept.held = _held(session)
@@ -168,13 +168,6 @@ def _held_of(model: type[PairRow] | type[StepRow]) -> Select[str, Any]:
     """Returns the query for until when pairs, or steps, of a job are held at the latest."""
     held = (model.state == leases.RUNNING, model.lease_until.is_not(None))
     return select(model.job_id, func.max(model.lease_until)).where(*held).group_by(model.job_id)
-
-
-@cache
-def _parents() -> Select[str | None]:
-    """Returns the query for which of some jobs have made jobs that have not ended."""
-    made = (JobRow.parent_id.in_(bindparam("jobs", expanding=True)), JobRow.state.in_(unfinished(JOB)))
-    return select(JobRow.parent_id).where(*made).distinct()
 
 
 @cache

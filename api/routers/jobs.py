@@ -300,7 +300,7 @@ def get_job_pairs(
         rows, last = pairs.page(session, job.id, iteration=iteration, only=only, after=begin, limit=limit)
     scene = scenes.load(db, job.scene_id)
     known = enumerate(scene.pairs) if begin is None else ()
-    return PairMatrix.model_construct(  # with iterators, for api.reading
+    return PairMatrix.model_construct(  # api.reading goes through its iterators once
         pairs=(PairInfo(index=index, a=one.a, b=one.b) for index, one in known if pair is None or index in pair),
         iterations=[_iteration(row) for row in iterations] if begin is None else [],
         cells=(_cell(scene, list(parts)) for _, parts in itertools.groupby(rows, lambda row: (row.iteration, row.pair_index))),
