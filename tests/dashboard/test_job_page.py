@@ -17,6 +17,7 @@ from db.states import JobState
 from db.types import utcnow
 from tests.dashboard.job_scenes import begin, certified, large_job, new_job, settle, too_close
 from tests.dashboard.test_region_page import OBSERVE
+from tests.dashboard.test_truth import until
 from tests.scenes import slider
 
 DESK = {"viewport": {"width": 1280, "height": 800}}
@@ -236,9 +237,8 @@ def test_what_holds_the_region_back_is_said_and_drawn(page: Any, url: str, job_i
     page.get_by_text("world/post0 are painted").scroll_into_view_if_needed()
     robot = page.get_by_role("img", name=re.compile(r"^The robot at slide 0\.400 m"))
     robot.wait_for()
-    page.wait_for_timeout(300)
+    until(lambda: orange(page.context.browser, robot.screenshot()) > 500)  # the two bodies are painted
     picture = robot.screenshot()
-    assert orange(page.context.browser, picture) > 500, "the two bodies are painted"
     (place,) = page.evaluate(MARKED)
     assert place == pytest.approx([0.2, 0.25, 0], abs=1e-6), "midway between the cart and the post"
     ink = page.evaluate("getComputedStyle(document.documentElement).getPropertyValue('--ink')").strip()

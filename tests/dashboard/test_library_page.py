@@ -24,6 +24,7 @@ from planner.poses.frame import frame_of, pose_at, pose_of
 from tests.api.conftest import certified_polytope, store_region
 from tests.api.test_planning import store_map
 from tests.certifier.scenes import cube, planar_arm
+from tests.dashboard.test_truth import until
 
 BOXES = [((-0.2, -0.1), 0.1), ((-0.05, -0.1), 0.1), ((-0.5, -0.5), 0.05)]
 """Centres and half widths in s of three regions: the first two overlap, the third is apart."""
@@ -160,25 +161,39 @@ def cut_off(page: Any, canvas: Any) -> int:
     return found
 
 
+def changed(canvas: Any, before: bytes) -> bytes:
+    """A canvas that does not look as before, and does not change any more."""
+    pictures = [before]
+
+    def still() -> bool:
+        pictures.append(canvas.screenshot())
+        return pictures[-1] == pictures[-2] != before
+
+    until(still)
+    return pictures[-1]
+
+
 def test_the_robot_is_in_view_wherever_it_stands_until_somebody_turns_the_view(browser: Any, url: str, planar: Scene) -> None:
     context = browser.new_context(viewport={"width": 390, "height": 844}, bypass_csp=True)  # the test reads a picture of its own
     page = context.new_page()
     page.goto(f"{url}/scenes/{planar.name}?q=-1.7,-0.6")
     canvas, slider = page.locator(".robot canvas"), page.locator(".slider input[type=number]").first
     slider.wait_for()
-    for degrees in ("-97", "97"):
+    for degrees in ("97", "-97"):
+        before = canvas.screenshot()
         slider.fill(degrees)
         slider.press("Tab")
-        page.wait_for_timeout(300)
+        changed(canvas, before)
         assert cut_off(page, canvas) == 0, degrees
     tools = page.locator(".view-tools").bounding_box()
     assert tools["y"] + tools["height"] <= canvas.bounding_box()["y"], "nor is it behind the buttons"
     page.goto(f"{url}/scenes/{planar.name}?q=0,0")
     slider.wait_for()
     canvas.press("+")
+    before = canvas.screenshot()
     slider.fill("-97")
     slider.press("Tab")
-    page.wait_for_timeout(300)
+    changed(canvas, before)
     assert cut_off(page, canvas) > 0, "the view stays where somebody has brought it"
     context.close()
 
@@ -284,39 +299,36 @@ def test_a_link_is_dragged_and_the_rest_of_the_view_turns(page: Any, url: str, p
 def test_bodies_are_hidden_faded_and_named_from_a_tree_and_the_view_stands_elsewhere(opened: Any, planar: Scene) -> None:
     canvas = opened.locator(".robot canvas")
 
-    def looks(*, after: str) -> bytes:
-        """A picture that differs from the last one."""
-        opened.wait_for_timeout(200)
-        seen.append(canvas.screenshot())
-        assert seen[-1] != seen[-2], after
-        return seen[-1]
+    def looks() -> None:
+        """Waits for a picture that differs from the last one."""
+        seen.append(changed(canvas, seen[-1]))
 
     seen = [canvas.screenshot()]
     for view in ("front", "top"):
         opened.get_by_role("button", name=f"View: {view}").click()
-        looks(after=view)
+        looks()
     opened.get_by_label("frames").check()
-    looks(after="frames")
+    looks()
     opened.locator(".view-tools summary").click()
     tree = opened.locator(".view-tools details")
     assert {name.strip() for name in tree.locator("label").all_text_contents()} == {*planar.bodies}
     nested = tree.locator("li", has=opened.get_by_label("arm/link1", exact=True)).locator("li").get_by_label("arm/link2", exact=True)
     assert nested.count() == 1, "the second link hangs on the first"
     tree.get_by_label("arm/link2", exact=True).focus()
-    looks(after="pointing at a body")
+    looks()
     fade = tree.get_by_role("button", name="Fade arm/link2")
     fade.click()
-    looks(after="fading it")
+    looks()
     assert fade.get_attribute("aria-pressed") == "true"
     tree.get_by_label("arm/link2", exact=True).uncheck()
-    looks(after="hiding it")
+    looks()
     opened.get_by_text("bodies, 1 hidden").wait_for()
     before = shown(opened)
     opened.get_by_role("button", name="View: fit").click()
-    looks(after="fit")
+    looks()
     assert shown(opened) == before
     tree.get_by_label("arm/link2", exact=True).check()
-    looks(after="showing it again")
+    looks()
 
 
 def drag(page: Any, at: tuple[float, float], down: float) -> None:

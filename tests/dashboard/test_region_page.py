@@ -19,15 +19,27 @@ from tests.dashboard.test_truth import until
 
 READY = "The robot is inside the region"
 OBSERVE = """
+window.inView = { traverse() {} };
 window.__THREE_DEVTOOLS__ = new EventTarget();
 __THREE_DEVTOOLS__.addEventListener("observe", ({ detail }) => { if (detail.isScene) window.inView = detail; });
 """
-"""three.js tells whoever looks for faults of its scenes."""
+"""three.js tells whoever looks for faults of its scenes. Until it is loaded, there is nothing in view."""
 DRAWN = """() => {
     const found = [];
     inView.traverse((one) => { if (one.geometry?.type === "PlaneGeometry") found.push([one.visible, one.matrixWorld.elements]); });
     return found;
 }"""
+
+
+CORNERS = np.array([[x, y, 0.0, 1.0] for x in (-0.5, 0.5) for y in (-0.5, 0.5)] + [[0.0, 0.0, 0.0, 1.0]])
+"""The corners and the middle of the square that is drawn, in its own frame."""
+
+
+def square(page: Any) -> tuple[bool, Array]:
+    """The square of the one plane in view: whether it is seen, and its pose in the world, shape (4, 4)."""
+    until(lambda: len(page.evaluate(DRAWN)) == 1)
+    ((visible, elements),) = page.evaluate(DRAWN)
+    return visible, np.array(elements).reshape(4, 4).T
 
 
 @pytest.fixture
@@ -173,29 +185,27 @@ def test_the_cells_of_a_pair_are_drawn_over_the_slice(opened: Any, planar: Scene
         choice.select_option(index=1)
     cells = answer.value.json()
     assert (cells["certified"], cells["pair"]["a"] in planar.pairs[0].a) == (True, True)
-    opened.wait_for_timeout(200)
-    assert opened.locator(".slice canvas").screenshot() != before
+    until(lambda: opened.locator(".slice canvas").screenshot() != before)
     assert opened.locator(".key-map.cells").count() == 1
 
 
 def test_the_plane_of_the_cell_is_drawn_between_the_bodies_and_moves(opened: Any, barriers: Any) -> None:
     canvas, says = opened.locator(".robot canvas"), opened.locator(".plane-said")
+    samples = canvas.screenshot()
     opened.get_by_label("show 40 samples").uncheck()
-    opened.wait_for_timeout(200)
-    pictures = [canvas.screenshot()]
+    until(lambda: canvas.screenshot() != samples)
+    without = canvas.screenshot()
     with opened.expect_response(lambda response: "/plane?" in response.url) as answer:
         opened.get_by_label("Cells of the pair").select_option(index=1)
     plane = answer.value.json()
     says.get_by_text(f"the plane of cell {plane['cell']} is between {plane['volumes'][0]} and {plane['volumes'][1]}").wait_for()
     assert says.locator(".proved").text_content() == "Proved:"
-    opened.wait_for_timeout(200)
-    pictures.append(canvas.screenshot())
+    until(lambda: canvas.screenshot() != without)
     assert barriers(opened) == []
+    between = canvas.screenshot()
     opened.get_by_role("button", name="arm/joint2 max").click()
     says.get_by_text("the plane of cell").wait_for()
-    opened.wait_for_timeout(200)
-    pictures.append(canvas.screenshot())
-    assert len(set(pictures)) == 3
+    until(lambda: canvas.screenshot() not in (between, without))
     opened.locator(".slice canvas").click(position={"x": 300, "y": 60})
     opened.get_by_text("nothing is proved here").wait_for()
     says.get_by_text("no plane is proved here").wait_for()
@@ -208,28 +218,30 @@ def test_the_square_is_in_the_plane_that_the_proof_has_at_the_joint_positions(
     page.goto(f"{url}/regions/{planar_region}#pair=0")
     page.get_by_text(READY).wait_for()
     ends = client.get(f"/v1/regions/{planar_region}/configurations").json()["extremes"]
-    normals = []
-    for joint, end in (("arm/joint1", "lower"), ("arm/joint2", "upper")):
+
+    def normal(joint: str, end: str) -> Array:
+        """Moves the joint to its end, and gives the normal of the square there, in the world."""
         page.get_by_role("button", name=f"{joint} {'min' if end == 'lower' else 'max'}").click()
-        page.locator(".plane-said").get_by_text("the plane of cell").wait_for()
-        page.wait_for_timeout(200)
         q = np.array(next(one[end] for one in ends if one["joint"] == joint))
         asked = "&".join(f"q={value}" for value in q)
         plane = client.get(f"/v1/regions/{planar_region}/pairs/0/plane?{asked}").json()
         s = planar.to_s(q)
         *a, b = np.array(plane["Z"]) @ [1.0, *s[plane["joints"]]]
-        ((visible, elements),) = page.evaluate(DRAWN)
-        X = np.array(elements).reshape(4, 4).T
+
+        def off() -> float:
+            """How far the corners and the middle of the square are from the plane, in metres."""
+            p = Kinematics.of(planar).points(plane["frame"], WORLD, (CORNERS @ square(page)[1].T)[:, :3], s[None])[0]
+            return float(np.abs(p @ a + b).max() / np.linalg.norm(a))
+
+        until(lambda: off() < 1e-6)
+        visible, X = square(page)
         assert visible
-        # Its corners and its middle, from the world into the frame of the plane.
-        corners = np.array([[x, y, 0.0, 1.0] for x in (-0.5, 0.5) for y in (-0.5, 0.5)] + [[0.0, 0.0, 0.0, 1.0]]) @ X.T
-        p = Kinematics.of(planar).points(plane["frame"], WORLD, corners[:, :3], s[None])[0]
-        assert np.abs(p @ a + b).max() / np.linalg.norm(a) < 1e-6
         tip = (X @ [0.0, 0.0, 1.0, 0.0])[:3] / np.linalg.norm(X[:3, 2])
-        beyond = Kinematics.of(planar).points(plane["frame"], WORLD, corners[-1:, :3] + tip, s[None])[0]
+        beyond = Kinematics.of(planar).points(plane["frame"], WORLD, X[None, :3, 3] + tip, s[None])[0]
         assert (beyond @ a + b)[0] / np.linalg.norm(a) == pytest.approx(1.0), "it faces the first body"
-        normals.append(tip)
-    assert np.abs(normals[0] - normals[1]).max() > 1e-3, "it has moved"
+        return np.array(tip)
+
+    assert np.abs(normal("arm/joint1", "lower") - normal("arm/joint2", "upper")).max() > 1e-3, "it has moved"
 
 
 def test_the_cells_of_a_pair_of_a_job_lead_to_its_planes(page: Any, url: str, client: TestClient, worker: None, database: Database) -> None:
