@@ -12,11 +12,14 @@ from typing import Any
 
 import numpy as np
 
+from certifier.conditioned import with_conditions
+from certifier.conditions import Cone
 from certifier.growth.options import GrowthOptions
 from certifier.jobs import local, motion
 from certifier.jobs.map import grow_map
 from certifier.map.free_set import free_set
-from certifier.seeding.arm import AT, NEAR, arm
+from certifier.model import WORLD, Polytope
+from certifier.seeding.arm import AT, HAND, NEAR, arm
 from certifier.seeding.iris import iris
 from certifier.seeding.options import SeedOptions
 from certifier.seeding.proposal import Proposal
@@ -24,15 +27,21 @@ from certifier.seeding.proposal import Proposal
 PART = 0.6
 """The faces of the proposal are moved to this part of their distance from the seed: all that is left is certified at once."""
 
+UPRIGHT = Cone("upright", HAND, (0.0, 0.0, 1.0), WORLD, (0.0, 0.0, 1.0), 1.0)
+HALF = 0.05
+"""The condition is certified on a cube of this half width, in s: what proves a plane that is known before."""
+
+CELLS = 100
+"""Of each pair, as many cells are looked at; a few are enough."""
 
 COVERED = 0.05
 """The map of the arm ends when it covers this share."""
 
 
 def warm_up() -> dict[str, Any]:
-    """Grows regions of a small arm, in both ways, and a map, while another process certifies a motion. Drake is not loaded.
+    """Grows regions of a small arm, in both ways, certifies a condition, and grows a map. Another process certifies a motion.
 
-    Returns the map's free set (certifier.map.free_set).
+    Drake is not loaded. Returns the map's free set (certifier.map.free_set).
 
     Motions are certified by children of workers, so it is enough that what they call is kept.
     """
@@ -45,6 +54,8 @@ def warm_up() -> dict[str, Any]:
     proposal = Proposal(C, nearer, center[0], contain, {**account, "seconds": 0.0})
     for asked in ({"stages": 1}, {"paper": {"pushes": 1}}):
         local.grow(scene, GrowthOptions.from_document({"seed": {"q": AT}, **asked}), propose=lambda _: proposal)
+    cube = Polytope(np.concatenate([np.eye(scene.n), -np.eye(scene.n)]), np.full(2 * scene.n, HALF))
+    local.certify(with_conditions(scene, [UPRIGHT]), cube, cells=CELLS)
     grown = grow_map(scene, coverage=COVERED).proof
     grow_map(scene, coverage=COVERED, former=grown)
     motions.join()

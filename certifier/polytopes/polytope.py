@@ -278,7 +278,7 @@ def _axis_limits(polytope: Polytope) -> tuple[Array, NDArray[np.int64]]:
     C, d = polytope.C, polytope.d
     n = C.shape[1]
     rows = np.full(2 * n, -1)
-    _single_rows(C, d, rows)
+    _single_rows(np.ascontiguousarray(C), np.ascontiguousarray(d), rows)
     a = np.abs(C[rows, np.tile(np.arange(n), 2)])
     with np.errstate(divide="ignore", invalid="ignore"):
         limits = np.where(a == 1, d[rows], np.nextafter(d[rows] / a, np.inf))

@@ -8,6 +8,8 @@ from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene
 
 JOINTS = 5
 """With this many joints, volumes are chosen that stand for the whole hand (certifier.partition.levels)."""
+HAND = f"arm/link{JOINTS - 1}"
+"""The body of the hand."""
 LIMIT = 0.35
 """The hand touches the post and the floor in so few corners that IRIS soon has them cut off, and enough that samples show them."""
 AT, NEAR = (0.0,) * JOINTS, (0.05,) * JOINTS
@@ -25,8 +27,8 @@ def arm() -> Scene:
     )
     box = np.array([[x, y, z] for x in (0.1, 0.2) for y in (-0.05, 0.05) for z in (-0.05, 0.05)])
     geometries = (
-        Geometry("arm/box", bodies[-1], box, 0.0, {}),
-        Geometry("arm/ball", bodies[-1], np.array([[0.3, 0.0, 0.0]]), 0.05, {}),
+        Geometry("arm/box", HAND, box, 0.0, {}),
+        Geometry("arm/ball", HAND, np.array([[0.3, 0.0, 0.0]]), 0.05, {}),
         Geometry("world/post", WORLD, np.array([[1.1, 0.5, -0.5], [1.1, 0.5, 0.5]]), 0.05, {}),
         Geometry("world/floor", WORLD, np.array([10.0, 10.0, 1.0]) * box - [0.0, 0.0, 0.7], 0.0, {}),
     )

@@ -68,6 +68,7 @@ def client(database: Database, queue: Queue, environment: pytest.MonkeyPatch) ->
     queue.flush()
     environment.setenv("CIRIS_REDIS_URL", queue.url)
     environment.setenv("CIRIS_SECRET_KEY", SECRET_KEY)
+    environment.setattr("api.probes.WAIT_SECONDS", 10.0)  # the first look at the queue takes longer where the machine is busy
     with TestClient(create_app(database), base_url=BASE_URL) as client:
         yield client
 

@@ -230,13 +230,13 @@ def test_every_key_has_its_own_rate(hasty: TestClient, database: Database) -> No
 
 
 def test_all_keys_of_a_project_have_a_rate_together(database: Database, environment: pytest.MonkeyPatch) -> None:
-    environment.setenv("CIRIS_REQUESTS_PER_SECOND", "20")
+    environment.setenv("CIRIS_REQUESTS_PER_SECOND", "5")
     with database.write() as session:
         projects.add(session, "other")
-        many = [keys.add(session, f"key{i}", Scope.READ) for i in range(9)]
+        many = [keys.add(session, f"key{i}", Scope.READ) for i in range(6)]
         other = keys.add(session, "other", Scope.READ, "other")
     with TestClient(create_app(database), base_url=BASE_URL) as client:
-        asked = (client.get("/v1/project", headers=bearer(key)) for _ in range(39) for key in many)
+        asked = (client.get("/v1/project", headers=bearer(key)) for _ in range(9) for key in many)
         refused = next(answer for answer in asked if answer.status_code != 200)
         assert (refused.status_code, refused.json()["detail"]) == (429, "more requests than one project may make")
         assert client.get("/v1/project", headers=bearer(other)).status_code == 200
@@ -288,7 +288,7 @@ def test_a_wrong_secret_counts_against_the_address_and_reads_nothing(hasty: Test
         began = time.monotonic()
         statuses = (hasty.get("/v1/jobs", headers=bearer(guess)).status_code for _ in range(100))
         assert next(status for status in statuses if status != 401) == 429
-        assert len(seen) <= 1 + (time.monotonic() - began) / KEYS_SECONDS
+        assert len(seen) <= 2 + 2 * (time.monotonic() - began) / KEYS_SECONDS
     assert hasty.get("/v1/jobs", headers=bearer(key)).status_code == 200
 
 
@@ -391,9 +391,9 @@ def test_a_use_that_cannot_be_noted_is_noted_later(
 
 def test_a_key_that_has_expired_is_refused(client: TestClient, database: Database) -> None:
     with database.write() as session:
-        key = keys.add(session, "visitor", Scope.READ, days=1.0 / 86400)
+        key = keys.add(session, "visitor", Scope.READ, days=4.0 / 86400)
     answers = [client.get("/v1/jobs", headers=bearer(key)).status_code]
-    time.sleep(1.2)
+    time.sleep(4.2)
     assert [*answers, client.get("/v1/jobs", headers=bearer(key)).status_code] == [200, 401]
 
 

@@ -30,7 +30,8 @@ def test_all_that_ask_during_a_look_share_it() -> None:
     assert asyncio.run(ask()) == [0] * 50 + [1]
 
 
-def test_a_long_look_is_believed_for_a_while() -> None:
+def test_a_long_look_is_believed_for_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("api.probes.WAIT_SECONDS", 30.0)
     looks = []
 
     def look() -> int:

@@ -14,7 +14,7 @@ from fastapi.testclient import TestClient
 from api import probes
 from api.access import KEYS_SECONDS
 from api.app import create_app
-from api.probes import BELIEVED_SECONDS, SILENT
+from api.probes import BELIEVED_SECONDS, SILENT, WAIT_SECONDS
 from certifier.model import Scene
 from db import disk, keys
 from db.keys import Scope
@@ -65,7 +65,7 @@ def test_a_queue_that_hangs_takes_neither_readiness_nor_metrics(own_queue: Queue
                 assert found['ciris_check{check="queue"}'] == 0
                 assert found["ciris_regions"] == 0
                 assert not any(name.startswith("ciris_queue_messages") for name in found)
-            assert sum(thread.name == "probe" for thread in threading.enumerate()) == 1
+            eventually(lambda: sum(thread.name == "probe" for thread in threading.enumerate()) == 1, "only the one that hangs is left", 10)
             assert client.post("/v1/jobs", json=GROW).status_code == 201
 
 
@@ -104,6 +104,7 @@ def test_nobody_is_let_in_before_the_keys_were_read_once(postgres: Postgres, on_
 
 def test_a_disk_that_hangs_is_named(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     """No disk of a test can hang, so looking at it does."""
+    monkeypatch.setattr(probes, "WAIT_SECONDS", WAIT_SECONDS)
     comes_back = threading.Event()
 
     def look(_directory: Path) -> str:

@@ -176,8 +176,8 @@ def test_a_session_ends_with_its_key_and_in_time(client: TestClient, database: D
     with database.write() as session:
         keys.revoke(session, name)
     eventually(lambda: client.get("/v1/jobs").status_code == 401, "the session ends with its key")
-    signed_in(client, database, days=1.0 / 86400)
-    time.sleep(1.2)
+    signed_in(client, database, days=4.0 / 86400)
+    time.sleep(4.2)
     assert client.get("/v1/jobs").status_code == 401
     signed_in(client, database)
     with database.write() as session:
@@ -578,10 +578,10 @@ def test_a_provider_that_fails_between_is_said_so(fooled: TestClient, liar: Liar
 
 
 def test_a_slow_provider_holds_nobody_else(fooled: TestClient, liar: Liar, database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(oidc, "SECONDS", 2.0)
+    monkeypatch.setattr(oidc, "SECONDS", 5.0)
     key = a_key(database, Scope.READ)
     assert fooled.get("/v1/project", headers=bearer(key)).status_code == 200
-    liar.delay = 3.0
+    liar.delay = 6.0
     with ThreadPoolExecutor(60) as threads:
         began = time.monotonic()
         waiting = [threads.submit(of_provider, fooled) for _ in range(50)]
@@ -589,9 +589,9 @@ def test_a_slow_provider_holds_nobody_else(fooled: TestClient, liar: Liar, datab
         for _ in range(5):
             asked = time.monotonic()
             assert fooled.get("/v1/project", headers=bearer(key)).status_code == 200
-            assert time.monotonic() - asked < 1.0
+            assert time.monotonic() - asked < 4.0
         assert {future.result()[0] for future in waiting} == {503}
-        assert time.monotonic() - began < 10.0
+        assert time.monotonic() - began < 15.0
     assert len(liar.asked) == 1, "it was asked once for all of them"
 
 
@@ -605,7 +605,7 @@ def test_nobody_has_the_service_ask_the_provider_without_end(fooled: TestClient,
     allowed = SIGN_INS_PER_SECOND * (BURST_SECONDS + time.monotonic() - began)
     assert {answer.status_code for answer in answers} == {403, 429}
     assert len(liar.forms) <= allowed + 1
-    assert answers[-1].headers["retry-after"] == "1"
+    assert {answer.headers["retry-after"] for answer in answers if answer.status_code == 429} == {"1"}
     assert fooled.get("/login").status_code == 200, "other pages are answered"
 
 

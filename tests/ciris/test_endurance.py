@@ -30,8 +30,9 @@ from tests.errors.python import NOBODY, answered
 
 @contextmanager
 def serving(database: Database, port: int) -> Iterator[None]:
-    server = uvicorn.Server(uvicorn.Config(create_app(database), port=port, log_level="warning", timeout_graceful_shutdown=1))
-    thread = threading.Thread(target=server.run)
+    server = uvicorn.Server(uvicorn.Config(create_app(database), log_level="warning", timeout_graceful_shutdown=1))
+    listening = socket.create_server(("127.0.0.1", port), reuse_port=True)
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
     thread.start()
     while not server.started:
         time.sleep(0.02)
@@ -40,14 +41,16 @@ def serving(database: Database, port: int) -> Iterator[None]:
     finally:
         server.should_exit = True
         thread.join()
+        listening.close()
 
 
 @pytest.fixture
-def port() -> int:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        found: int = free.getsockname()[1]
-    return found
+def port() -> Iterator[int]:
+    """A port that nobody else is given, at which nobody listens yet."""
+    with socket.socket() as held:
+        held.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        held.bind(("127.0.0.1", 0))
+        yield held.getsockname()[1]
 
 
 def end(database: Database, job_id: str) -> None:

@@ -22,7 +22,7 @@ def elsewhere(page: Any, browser: Any) -> Any:
     contexts = []
 
     def opened() -> Any:
-        page.wait_for_timeout(SETTLED_MS)
+        page.evaluate(f"new Promise((done) => setTimeout(done, {SETTLED_MS}))")  # the page's own timers fire in order
         contexts.append(browser.new_context())
         other = contexts[-1].new_page()
         other.goto(page.url)

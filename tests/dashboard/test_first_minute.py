@@ -15,6 +15,7 @@ from fastapi.testclient import TestClient
 from certifier.model import Scene
 from certifier.scene.bundle import pack_bundle
 from tests.dashboard.samples import NAMES, ROOT, SAMPLES, files
+from tests.dashboard.test_truth import EFFECTS
 
 ARM = ROOT / "examples" / "arm_3dof" / "arm.urdf"
 
@@ -108,6 +109,7 @@ def drop(page: Any, place: Any, path: Path, steps: tuple[str, ...] = ("dragEnter
 def drag(page: Any, x: float, y: float, path: Path, steps: tuple[str, ...]) -> None:
     dragged = {"items": [], "files": [str(path)], "dragOperationsMask": 1}
     tools = page.context.new_cdp_session(page)
+    page.evaluate(EFFECTS)
     for step in steps:
         tools.send("Input.dispatchDragEvent", {"type": step, "x": x, "y": y, "data": dragged})
 

@@ -287,6 +287,7 @@ def test_a_link_is_dragged_and_the_rest_of_the_view_turns(page: Any, url: str, p
     page.goto(f"{url}/scenes/planar")
     canvas = page.locator(".robot canvas")
     page.locator(".said", has_text="No collision (computed").wait_for()
+    until(lambda: canvas.evaluate("one => one.width") > 300)  # the view has its size, and listens
     box = canvas.bounding_box()
     middle, corner = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2), (box["x"] + 15, box["y"] + box["height"] - 15)
     drag(page, middle, 70)
@@ -513,7 +514,7 @@ def test_the_first_contact_of_a_path_is_shown(page: Any, url: str, planar: Scene
 def test_a_path_that_begins_in_contact_is_nowhere_proved(page: Any, url: str, planar: Scene) -> None:
     upload(page, url, "path.csv", "0.5236, 0.2618\n-0.3, 0.1\n")
     page.get_by_text("Not certified.").wait_for()
-    assert page.locator("#claim-motion").text_content() == "Not proved from 0.00 s of the motion on."
+    page.locator("#claim-motion", has_text="Not proved from 0.00 s of the motion on.").wait_for()
     assert [part.get_attribute("class") for part in page.locator(".parts li").all()] == ["nothing"]
 
 

@@ -63,6 +63,7 @@ def test_the_meshes_of_a_model_are_drawn_in_the_bodies_that_are_certified(arm: A
 
 def test_a_mesh_moves_and_hides_with_its_body(arm: Any) -> None:
     arm.get_by_label("meshes of the model").check()
+    drawn(arm, 2)
     arm.get_by_label("certified bodies").uncheck()
     drawn(arm, 1)
     place = "() => { let found; inView.traverse((one) => { if (one.geometry?.getAttribute('position')?.count === 60) found = one; });"

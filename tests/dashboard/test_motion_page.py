@@ -10,9 +10,17 @@ from fastapi.testclient import TestClient
 
 from certifier.model import Scene
 from certifier.verify.decimals import at_least_mm
-from tests.dashboard.test_truth import until
+from tests.dashboard.test_truth import EFFECTS, until
 
 FREE, BLOCKED = [[-0.3, 0.1], [-0.6, 0.4]], [[-0.3, 0.1], [0.0, 0.1], [0.8, 0.1]]
+
+
+def to_the_end(page: Any) -> None:
+    """Moves the robot to the end of the motion, once the player does not go to its beginning any more."""
+    time = page.get_by_label("Time, seconds")
+    time.wait_for()
+    page.evaluate(EFFECTS)
+    time.press("End")
 
 
 @pytest.mark.usefixtures("worker")
@@ -24,7 +32,7 @@ def test_a_motion_has_its_claim_and_is_played(page: Any, url: str, planar: Scene
     claim.get_by_text("all along the motion, the bodies of each covered pair stay apart").wait_for(timeout=60_000)
     verdict = client.get(f"/v1/jobs/{job}/motion").json()
     assert claim.locator("dd").all_text_contents()[:2] == ["2", f"at least {at_least_mm(verdict['clearance'])}"]
-    page.get_by_label("Time, seconds").press("End")
+    to_the_end(page)
     page.locator(".moment", has_text="on the motion, which is certified").wait_for()
     length = np.linalg.norm(np.subtract(*FREE))
     assert page.locator(".player output").text_content() == f"{length:.2f} s"
@@ -40,7 +48,7 @@ def test_where_nothing_is_proved_the_motion_says_so(page: Any, url: str, planar:
     job = client.post("/v1/jobs", json={"kind": "certify-path", "scene": "planar", "q": BLOCKED}).json()["id"]
     page.goto(f"{url}/jobs/{job}")
     page.locator(".claim", has_text="After that, nothing is proved.").wait_for(timeout=60_000)
-    page.get_by_label("Time, seconds").press("End")
+    to_the_end(page)
     page.locator(".moment", has_text="where nothing is proved").wait_for()
     (stop,) = client.get(f"/v1/jobs/{job}/obstacles").json()["obstacles"]
     words = ", ".join(f"{np.rad2deg(angle):.1f}\N{DEGREE SIGN}" for angle in stop["q"])
@@ -68,7 +76,7 @@ def test_a_motion_that_is_straight_in_s_is_played_so(page: Any, url: str, planar
         heights = np.array([float(place.split(",")[1]) for place in path.get_attribute("d")[1:].split("L")])
         q = planar.to_q(np.linspace(*s, len(heights)))[:, joint]
         assert (heights - heights[0]) / (heights[-1] - heights[0]) == pytest.approx((q - q[0]) / (q[-1] - q[0]), abs=2e-3)
-    page.get_by_label("Time, seconds").press("End")
+    to_the_end(page)
     page.locator(".moment", has_text="on the motion, which is certified").wait_for()
 
 

@@ -552,6 +552,8 @@ def test_the_form_says_that_it_looks_for_a_free_configuration(page: Any, url: st
     page.get_by_role("button", name=button).click()
     page.get_by_role("status").filter(has_text="Looking for a free configuration").wait_for()
     assert page.get_by_role("button", name=button).is_disabled()
+    while not held:
+        page.wait_for_timeout(20)
     held[0].continue_()
     page.get_by_text("Looking for a free configuration").wait_for(state="detached")
     page.get_by_text("No collision (computed").wait_for()

@@ -58,7 +58,8 @@ def opened(page: Any, url: str, planar_region: str) -> Any:
 
 def shown(page: Any) -> Array:
     """The joint positions that the fields show, in radians."""
-    return np.deg2rad([float(field.input_value()) for field in page.locator(".explore input[type=number]").all()])
+    fields = page.locator(".explore input[type=number]")
+    return np.deg2rad(fields.evaluate_all("fields => fields.map((field) => Number(field.value))"))  # at one moment
 
 
 def test_sliders_stay_inside_the_region(opened: Any, planar: Scene, faces: tuple[Array, Array]) -> None:

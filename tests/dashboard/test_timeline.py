@@ -29,6 +29,7 @@ def test_work_is_drawn_over_time_and_told_in_a_table(page: Any, url: str, databa
     bars = section.locator("svg.work rect")
     # The page waits ten times as long as an answer took before it asks again.
     section.locator("svg.work rect.too_close").wait_for(timeout=60_000)
+    section.locator("svg.work rect.certified").wait_for(timeout=60_000)
     assert bars.count() == 2
     assert "post0 in iteration 0: too close" in bars.nth(0).text_content()
     section.get_by_text("As a table").click()

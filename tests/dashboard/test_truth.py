@@ -19,6 +19,10 @@ def end(database: Database, job_id: str) -> None:
         jobs.finish(session, jobs.lock(session, job_id), JobState.SUCCEEDED, outcome="certified", reason="all is well")
 
 
+EFFECTS = "new Promise((done) => requestAnimationFrame(() => setTimeout(done)))"
+"""Preact runs the effects of what it has drawn, and adds listeners, in the frame after. This is over when they have run."""
+
+
 def until(holds: Callable[[], bool]) -> None:
     """Waits without the browser's help, whose page may be held up."""
     give_up = time.monotonic() + 20

@@ -28,8 +28,15 @@ before = called()
 print(json.dumps([sorted(before), sorted(called() - before)]))
 """
 PLANAR = """
+from dataclasses import replace
+
+import numpy as np
+
+from certifier.conditioned import with_conditions
+from certifier.conditions import Cone
 from certifier.growth.options import GrowthOptions
 from certifier.jobs import local
+from certifier.model import Polytope
 from certifier.scene import load_scene
 from certifier.seeding import propose
 from certifier.seeding.options import SeedOptions
@@ -37,7 +44,10 @@ from certifier.seeding.options import SeedOptions
 scene = load_scene("examples/planar_2dof/scene.yaml")
 proposal = propose.propose(scene, SeedOptions(q=(0.0, 0.0), contain={contain}))
 for asked in {ways}:
-    local.grow(scene, GrowthOptions.from_document({{"seed": {{"q": [0.0, 0.0]}}, **asked}}), propose=lambda _: proposal)
+    region = local.grow(scene, GrowthOptions.from_document({{"seed": {{"q": [0.0, 0.0]}}, **asked}}), propose=lambda _: proposal)
+    local.recertify(replace(scene, padding=0.01), region.proof)
+    ahead = Cone("ahead", "arm/lower", (1.0, 0.0, 0.0), "world", (1.0, 0.0, 0.0), 1.0)
+    local.certify(with_conditions(scene, [ahead]), Polytope(np.concatenate([np.eye(2), -np.eye(2)]), np.full(4, 0.05)), cells=100)
 """
 
 

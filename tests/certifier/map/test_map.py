@@ -208,7 +208,7 @@ def test_a_task_with_many_pieces_is_accepted_by_the_verifier():
     scene = planar_arm(3, ball("world/obstacle", WORLD, 0.2, (0.8, 0.9, 0.0)))
     growing = Growing(scene, np.zeros((0, 3)))
     tree = max(growing.trees.values(), key=lambda tree: tree.pair.joints)
-    samples = growing._samples[tree.cells.numbers][:, tree.pair.positions]
+    samples = np.ascontiguousarray(growing._samples[tree.cells.numbers][:, tree.pair.positions])
     given = tree.pair.root(np.arange(len(samples)))
     found = tree.pair.verified(given, tree.pair.advance(given, samples, np.ones(len(samples)), 3000, 0.0))
     vertices = sum(len(volume.vertices) for volume in tree.pair._volumes)

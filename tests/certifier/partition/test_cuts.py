@@ -62,7 +62,7 @@ def test_cells_of_bodies_that_seven_joints_move_are_cut_on_for_volumes_that_are_
     scene = replace(scene, pairs=scene.pairs[-1:])
     looking = Search(*_given(CellCertification(scene, cube(scene, 0.0, 0.25))))
     ball = looking._levels[1]
-    X = looking._area.samples
+    X = np.ascontiguousarray(looking._area.samples)
     touch = gaps(*ball.hulls, X) <= 0
     assert 0 < touch.sum() < len(X)
     half = np.full(7, np.tan(np.radians(turn) / 4))
