@@ -195,8 +195,9 @@ class _Nursery:
         return STATUS.unpack_from(reply)[0], reply[STATUS.size :]
 
     def wait(self, seconds: float) -> None:
-        """Waits until the process says something, or has ended, but no longer than this."""
-        self._connection.poll(seconds)
+        """Waits until the process has loaded, or has ended, but no longer than this."""
+        if not self._loaded:
+            self._connection.poll(seconds)
 
     def _answer(self, timeout_s: float, tell: Tell | None = None) -> bytes:
         """Returns what the nursery says next. Until then, ``tell`` hears how far the function is.

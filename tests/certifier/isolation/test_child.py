@@ -192,6 +192,14 @@ def test_calls_at_once_do_not_wait_for_each_other(call):
     assert answers[0]["pid"] != answers[1]["pid"]
 
 
+def test_nobody_waits_for_what_has_answered_already(call):
+    """It says once that it has loaded."""
+    nursery = call("count", {})["nursery"]
+    began = time.monotonic()
+    assert prepare("child_functions:count", 60.0) == nursery
+    assert time.monotonic() - began < 30.0
+
+
 def test_what_was_prepared_answers_the_first_call(call):
     prepare("child_functions:count")
     waiting = [nursery.process.pid for nursery in child._idle["child_functions"]]
