@@ -28,11 +28,8 @@ PART = 0.6
 """The faces of the proposal are moved to this part of their distance from the seed: all that is left is certified at once."""
 
 UPRIGHT = Cone("upright", HAND, (0.0, 0.0, 1.0), WORLD, (0.0, 0.0, 1.0), 1.0)
-HALF = 0.05
-"""The condition is certified on a cube of this half width, in s: what proves a plane that is known before."""
-
 CELLS = 100
-"""Of each pair, as many cells are looked at; a few are enough."""
+"""The condition is certified with at most this many cells of each pair. So what proves a plane that is known before is called."""
 
 COVERED = 0.05
 """The map of the arm ends when it covers this share."""
@@ -54,8 +51,7 @@ def warm_up() -> dict[str, Any]:
     proposal = Proposal(C, nearer, center[0], contain, {**account, "seconds": 0.0})
     for asked in ({"stages": 1}, {"paper": {"pushes": 1}}):
         local.grow(scene, GrowthOptions.from_document({"seed": {"q": AT}, **asked}), propose=lambda _: proposal)
-    cube = Polytope(np.concatenate([np.eye(scene.n), -np.eye(scene.n)]), np.full(2 * scene.n, HALF))
-    local.certify(with_conditions(scene, [UPRIGHT]), cube, cells=CELLS)
+    local.certify(with_conditions(scene, [UPRIGHT]), Polytope(C, nearer), cells=CELLS)
     grown = grow_map(scene, coverage=COVERED).proof
     grow_map(scene, coverage=COVERED, former=grown)
     motions.join()

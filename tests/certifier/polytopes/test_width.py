@@ -44,14 +44,14 @@ def test_in_one_direction_no_straight_motion_is_longer(seed: int) -> None:
     polytope = within([-1.5, -1.5], [1.5, 1.5], normals, normals @ rng.uniform(-1.0, 1.0, 2) + rng.uniform(0.02, 0.4, 6))
     space = arm(2)
     found = least_width_in_q(polytope, space)
-    begin = space.to_q(hit_and_run(polytope, chebyshev_center(polytope)[0], 24, seed))
+    begin = space.to_q(hit_and_run(polytope, chebyshev_center(polytope)[0], 64, seed))
     steps = np.linspace(0, 4, 4001)[1:, None]
 
     def reach(q: np.ndarray, way: np.ndarray) -> float:
         inside = (space.to_s(q + steps * way) @ polytope.C.T <= polytope.d).all(axis=1)
         return float(steps[-1, 0] if inside.all() else steps[inside.argmin(), 0])
 
-    angles = np.linspace(0, np.pi, 60, endpoint=False)
+    angles = np.linspace(0, np.pi, 90, endpoint=False)
     ways = np.column_stack([np.cos(angles), np.sin(angles)])
     longest = min(max(reach(q, way) + reach(q, -way) for q in begin) for way in ways)
     assert 0.3 * found < longest <= found + 2e-3
